@@ -15,5 +15,6 @@ pub mod pair;
 pub mod designate;
 pub mod trackability;
 pub mod driving;
+pub mod hazards;
 pub mod visual_odometry;
 pub mod version;

@@ -26,11 +26,11 @@ mod matches;
 mod measured;
 mod motion;
 mod points;
-mod reduce;
+pub(crate) mod reduce;
 mod repetition;
 mod rigidity;
 pub mod settings;
-mod windows;
+pub(crate) mod windows;
 
 pub use coarse::{CoarseSearch, Translation};
 pub use gates::gate_kinds;

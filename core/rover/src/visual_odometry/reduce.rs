@@ -11,14 +11,14 @@ use sightline_vision::image::{GrayImage, PixelRect};
 use super::windows::Eye;
 
 /// A reduced image with its camera.
-pub(super) struct Reduced {
-    pub(super) camera: Camera,
-    pub(super) image: GrayImage,
+pub(crate) struct Reduced {
+    pub(crate) camera: Camera,
+    pub(crate) image: GrayImage,
 }
 
 impl Reduced {
     /// Averages blocks of `factor` × `factor` pixels; incomplete blocks are dropped, an invalid pixel makes its block invalid.
-    pub(super) fn new(eye: Eye<'_>, factor: u32) -> Self {
+    pub(crate) fn new(eye: Eye<'_>, factor: u32) -> Self {
         let camera = eye.camera.downsampled(factor);
         let [width, height] = camera.size;
         let scale = 1.0 / (factor * factor) as f32;

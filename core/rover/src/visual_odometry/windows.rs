@@ -24,10 +24,10 @@ const GRAZING: f64 = 0.15;
 
 /// A camera with its image.
 #[derive(Clone, Copy)]
-pub(super) struct Eye<'a> {
+pub(crate) struct Eye<'a> {
     /// In the rover frame of its stop.
-    pub(super) camera: &'a Camera,
-    pub(super) image: &'a GrayImage,
+    pub(crate) camera: &'a Camera,
+    pub(crate) image: &'a GrayImage,
 }
 
 /// A match below the pixel.

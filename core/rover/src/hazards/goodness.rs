@@ -1,0 +1,236 @@
+//! The goodness map: tilt, roughness, step, certainty and goodness of every cell, from the sums of the hazard map.
+//!
+//! ```text
+//! g(v; ok, bad) = clamp((bad − v)/(bad − ok), 0, 1)
+//! goodness  = min(g(tilt), g(roughness), g(step))
+//! certainty = min(1, n/points_full) · (known cells in the disc)/(cells in the disc)
+//! age       = s − Σ w s_seen / Σ w
+//! ```
+//! | symbol | meaning | unit |
+//! |---|---|---|
+//! | n | decayed number of points in the disc of the rover's radius | – |
+//! | s, s_seen | distance driven, and that at the observation of a point | m |
+//!
+//! A cell of less certainty than `certainty_min` is unknown, and so is one whose points are on a line. Cells within
+//! `exemption_radius_m` of the target are exempt [R100]. Unknown cells near the start of the drive are assumed to be good until
+//! the rover is `start_distance_m` from it [R102].
+//!
+//! Frame: site. Source: domain.md 8.2.
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::disc_sums::{DiscSums, disc_sums};
+use super::grid::{Disc, Grid};
+use super::map::HazardMap;
+use super::settings::HazardSettings;
+use super::steps::steps;
+
+/// A term that limits the goodness of a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum HazardTerm {
+    /// Angle between the normal of the plane and the vertical, deg.
+    Tilt,
+    /// RMS residual of the plane, m.
+    Roughness,
+    /// Largest difference of the heights of two cells, m.
+    Step,
+    /// Certainty below its limit; of a path the share of unknown cells.
+    Unknown,
+}
+
+/// Where the goodness of a cell comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CellBasis {
+    /// Range data.
+    Measured,
+    /// Too few data: it has no goodness.
+    #[default]
+    Unknown,
+    /// Too few data, but near the start: counted as good.
+    Assumed,
+    /// Near the target: counted as good whatever the data are.
+    Exempt,
+}
+
+/// One cell of the goodness map. Terms are 0 without data.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct GoodnessCell {
+    /// Tilt of the plane, deg.
+    pub tilt_deg: f32,
+    /// RMS residual of the plane, m.
+    pub roughness_m: f32,
+    /// Largest step in the disc, m.
+    pub step_m: f32,
+    /// 0 (no data) to 1.
+    pub certainty: f32,
+    /// Mean distance driven since the observations, m.
+    pub age_m: f32,
+    /// 0 (bad) to 1; 0 if unknown.
+    pub goodness: f32,
+    /// Where the goodness comes from.
+    pub basis: CellBasis,
+}
+
+/// Goodness of all cells around the rover at one stop.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct GoodnessMap {
+    /// The window of cells.
+    pub grid: Grid,
+    /// Its cells, row by row.
+    pub cells: Vec<GoodnessCell>,
+    /// The settings of the assessment.
+    pub settings: HazardSettings,
+}
+
+/// A circle, site frame, m.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Circle {
+    /// Its centre.
+    pub centre_m: [f64; 2],
+    /// Its radius.
+    pub radius_m: f64,
+}
+
+/// Circles in which cells count as good in spite of the data.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MapRules {
+    /// All cells near the target [R100].
+    pub exemption: Option<Circle>,
+    /// Unknown cells near the start [R102].
+    pub start: Option<Circle>,
+}
+
+impl MapRules {
+    /// The rules at a stop: `target_m` and `start_m` are positions in the site frame, m; the first is `None` without a target.
+    pub fn at(
+        rover_m: [f64; 2],
+        start_m: [f64; 2],
+        target_m: Option<[f64; 2]>,
+        settings: &HazardSettings,
+    ) -> Self {
+        let circle = |centre_m: [f64; 2], radius_m: f64| Circle { centre_m, radius_m };
+        let is_near = (rover_m[0] - start_m[0]).hypot(rover_m[1] - start_m[1]) < settings.start_distance_m;
+        Self {
+            exemption: target_m
+                .filter(|_| settings.exemption_radius_m > 0.0)
+                .map(|target_m| circle(target_m, settings.exemption_radius_m)),
+            start: is_near.then(|| circle(start_m, settings.start_radius_m)),
+        }
+    }
+}
+
+impl Circle {
+    fn contains(&self, at_m: [f64; 2]) -> bool {
+        (at_m[0] - self.centre_m[0]).hypot(at_m[1] - self.centre_m[1]) <= self.radius_m
+    }
+}
+
+impl HazardTerm {
+    /// The goodness of a value of this term, 0 to 1; of the certainty 1 from its limit on.
+    fn goodness(self, value: f64, settings: &HazardSettings) -> f64 {
+        let [ok, bad] = match self {
+            Self::Tilt => [settings.tilt_ok_deg, settings.tilt_bad_deg],
+            Self::Roughness => [settings.roughness_ok_m, settings.roughness_bad_m],
+            Self::Step => [settings.step_ok_m, settings.step_bad_m],
+            Self::Unknown => return if value >= settings.certainty_min { 1.0 } else { 0.0 },
+        };
+        ((bad - value) / (bad - ok)).clamp(0.0, 1.0)
+    }
+}
+
+impl GoodnessCell {
+    /// The value of a term: deg, m, m, and the certainty.
+    pub fn value(&self, term: HazardTerm) -> f64 {
+        f64::from(match term {
+            HazardTerm::Tilt => self.tilt_deg,
+            HazardTerm::Roughness => self.roughness_m,
+            HazardTerm::Step => self.step_m,
+            HazardTerm::Unknown => self.certainty,
+        })
+    }
+
+    /// The term that limits the goodness, with its value; `None` for a cell of full goodness.
+    pub fn limiting(&self, settings: &HazardSettings) -> Option<(HazardTerm, f64)> {
+        if self.basis == CellBasis::Unknown {
+            return Some((HazardTerm::Unknown, self.value(HazardTerm::Unknown)));
+        }
+        if self.basis != CellBasis::Measured {
+            return None;
+        }
+        let worst = |worst: (HazardTerm, f64), term: HazardTerm| {
+            let goodness = term.goodness(self.value(term), settings);
+            if goodness < worst.1 { (term, goodness) } else { worst }
+        };
+        let (term, goodness) = [HazardTerm::Tilt, HazardTerm::Roughness, HazardTerm::Step]
+            .into_iter()
+            .fold((HazardTerm::Unknown, 1.0), worst);
+        (goodness < 1.0).then(|| (term, self.value(term)))
+    }
+
+    fn new(sums: &DiscSums, step_m: f32, disc: &Disc, driven_m: f64, settings: &HazardSettings) -> Self {
+        let count = sums.moments.count();
+        // Sums of cells without points are not exactly 0.
+        if count < settings.weight_min {
+            return Self::default();
+        }
+        let known = sums.known / disc.count() as f64;
+        let certainty = (count / settings.points_full).min(1.0) * known;
+        let age_m = driven_m - sums.moments.0[super::moments::SUMS - 1] / count;
+        let cell = Self { step_m, certainty: certainty as f32, age_m: age_m as f32, ..Self::default() };
+        let Some(plane) = sums.moments.plane() else { return cell };
+        let mut cell = Self {
+            tilt_deg: plane.tilt_rad.to_degrees() as f32,
+            roughness_m: plane.roughness_m as f32,
+            ..cell
+        };
+        if certainty >= settings.certainty_min {
+            cell.basis = CellBasis::Measured;
+            let goodness = [HazardTerm::Tilt, HazardTerm::Roughness, HazardTerm::Step]
+                .map(|term| term.goodness(cell.value(term), settings));
+            cell.goodness = goodness.into_iter().fold(1.0, f64::min) as f32;
+        }
+        cell
+    }
+
+    fn with_rules(self, at_m: [f64; 2], rules: &MapRules) -> Self {
+        let basis = if rules.exemption.is_some_and(|circle| circle.contains(at_m)) {
+            CellBasis::Exempt
+        } else if self.basis == CellBasis::Unknown && rules.start.is_some_and(|circle| circle.contains(at_m)) {
+            CellBasis::Assumed
+        } else {
+            return self;
+        };
+        Self { basis, goodness: 1.0, ..self }
+    }
+}
+
+/// Assesses every cell of a hazard map.
+pub fn assess(map: &HazardMap, rules: &MapRules, settings: &HazardSettings) -> GoodnessMap {
+    let [disc, reach] =
+        [settings.rover_radius_m, settings.step_reach_m].map(|radius_m| Disc::new(radius_m / map.grid.cell_m));
+    let (sums, steps) = rayon::join(
+        || disc_sums(map, &disc, settings.weight_min),
+        || steps(map, &disc, &reach, settings.weight_min),
+    );
+    let cells = sums
+        .par_iter()
+        .zip(&steps)
+        .enumerate()
+        .map(|(index, (sums, step_m))| {
+            let cell = GoodnessCell::new(sums, *step_m, &disc, map.driven_m, settings);
+            cell.with_rules(map.grid.centre_m(index), rules)
+        })
+        .collect();
+    GoodnessMap { grid: map.grid, cells, settings: settings.clone() }
+}
+
+impl GoodnessMap {
+    /// The cell at a position, site frame, m; `None` outside the window.
+    pub fn cell_at(&self, at_m: [f64; 2]) -> Option<&GoodnessCell> {
+        self.cells.get(self.grid.index_at(at_m)?)
+    }
+}

@@ -1,0 +1,148 @@
+//! The memory of the hazard map: sums over the points of each cell, kept while the cell is in the window.
+//!
+//! ```text
+//! w ← w · ½^(Δs/h)      for every sum of every cell, s: distance driven, h: half-life
+//! ```
+//! Points enter at the pose estimate of their stop. Sums are relative to the centre of the cell and to the height of the
+//! rover at the first stop: a map that has moved has the same bits as one that was built in its place.
+//!
+//! Frame: site, m. Source: domain.md 8.1 (wrap-around grid), 8.2.
+
+use serde::{Deserialize, Serialize};
+
+use sightline_geometry::error::Error;
+use sightline_geometry::frames::{Point3, Pose};
+
+use super::grid::Grid;
+use super::moments::{Moments, SUMS};
+use super::settings::HazardSettings;
+
+/// Sums below this number of points are forgotten.
+const FORGOTTEN: f64 = 1e-3;
+
+/// Range data of one stop.
+#[derive(Clone, Copy, Debug)]
+pub struct Scan<'a> {
+    /// Points, rover frame, m.
+    pub points_in_rover: &'a [Point3],
+    /// The pose estimate.
+    pub site_from_rover: &'a Pose,
+    /// Distance driven since the first stop, m.
+    pub driven_m: f64,
+}
+
+/// Hazard map of a drive: everything that the next stop needs of the stops before.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(into = "Stored", try_from = "Stored")]
+pub struct HazardMap {
+    pub(super) grid: Grid,
+    /// Height of the reference of the sums, z of the site frame, m.
+    height_m: f64,
+    /// Distance driven, m.
+    pub(super) driven_m: f64,
+    /// By slot.
+    cells: Vec<Moments>,
+}
+
+/// Stage 8, `map_hazards`: the map of the stop before, moved and decayed, with the points of this one. The map begins anew
+/// without one before, or if the size of cell or window has changed.
+pub fn map_hazards(before: Option<&HazardMap>, scan: &Scan<'_>, settings: &HazardSettings) -> HazardMap {
+    let origin = scan.site_from_rover.translation.vector;
+    let grid = Grid::around([origin.x, origin.y], settings.cell_m, settings.side_cells());
+    let mut map = match before.filter(|map| (map.grid.cell_m, map.grid.side) == (grid.cell_m, grid.side)) {
+        Some(before) => before.moved(grid, scan.driven_m, settings),
+        None => HazardMap {
+            grid,
+            height_m: origin.z,
+            driven_m: scan.driven_m,
+            cells: vec![Moments::default(); grid.len()],
+        },
+    };
+    map.add(scan, settings);
+    map
+}
+
+impl HazardMap {
+    /// The window of cells.
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// The sums of a cell.
+    #[inline]
+    pub(super) fn cell(&self, row: usize, column: usize) -> &Moments {
+        &self.cells[self.grid.slot(row, column)]
+    }
+
+    /// The map in another window, after a distance.
+    fn moved(&self, grid: Grid, driven_m: f64, settings: &HazardSettings) -> Self {
+        let factor = 0.5_f64.powf((driven_m - self.driven_m).max(0.0) / settings.half_life_m);
+        let mut cells = vec![Moments::default(); grid.len()];
+        for row in 0..grid.side {
+            for column in 0..grid.side {
+                let slot = grid.slot(row, column);
+                if grid.is_in(row, column, &self.grid) && self.cells[slot].count() * factor >= FORGOTTEN {
+                    cells[slot] = self.cells[slot];
+                    cells[slot].scale(factor);
+                }
+            }
+        }
+        Self { grid, height_m: self.height_m, driven_m, cells }
+    }
+
+    fn add(&mut self, scan: &Scan<'_>, settings: &HazardSettings) {
+        for point in scan.points_in_rover {
+            if -point.z > settings.height_max_m {
+                continue;
+            }
+            let point = scan.site_from_rover * point;
+            let Some([row, column]) = self.grid.cell_at([point.x, point.y]) else { continue };
+            let centre = self.grid.centre_m(row * self.grid.side + column);
+            let relative = [point.x - centre[0], point.y - centre[1], point.z - self.height_m];
+            let slot = self.grid.slot(row, column);
+            self.cells[slot].add(relative, scan.driven_m);
+        }
+    }
+}
+
+/// A map as it is stored: the cells that have points, by slot.
+#[derive(Serialize, Deserialize)]
+struct Stored {
+    grid: Grid,
+    height_m: f64,
+    driven_m: f64,
+    cells: Vec<(u32, [f64; SUMS])>,
+}
+
+/// Most cells along a side of a stored map.
+const SIDE_MAX: usize = 2000;
+
+impl From<HazardMap> for Stored {
+    fn from(map: HazardMap) -> Self {
+        let known = map.cells.iter().enumerate().filter(|(_, cell)| cell.count() > 0.0);
+        let cells = known.map(|(slot, cell)| (slot as u32, cell.0)).collect();
+        Self { grid: map.grid, height_m: map.height_m, driven_m: map.driven_m, cells }
+    }
+}
+
+impl TryFrom<Stored> for HazardMap {
+    type Error = Error;
+
+    fn try_from(stored: Stored) -> Result<Self, Error> {
+        let Stored { grid, height_m, driven_m, cells: known } = stored;
+        if grid.side == 0 || grid.side > SIDE_MAX || grid.cell_m.is_nan() || grid.cell_m <= 0.0 {
+            return Err(Error::Request(format!(
+                "a hazard map of {} × {} cells of {} m cannot be read",
+                grid.side, grid.side, grid.cell_m
+            )));
+        }
+        let mut cells = vec![Moments::default(); grid.len()];
+        for (slot, sums) in known {
+            let Some(cell) = cells.get_mut(slot as usize) else {
+                return Err(Error::Request(format!("a hazard map has no cell {slot}")));
+            };
+            *cell = Moments(sums);
+        }
+        Ok(Self { grid, height_m, driven_m, cells })
+    }
+}

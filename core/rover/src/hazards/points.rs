@@ -1,0 +1,44 @@
+//! Range data of a stereo pair: the points that its dense stereo finds, after a reduction of the images.
+//!
+//! Any pair that can be aligned serves: the hazcams (CAHVORE) or a wedge of the mast cameras. Two wedges are two lists of points,
+//! one after the other [R101].
+//!
+//! Frame: that of the cameras (rover), m.
+
+use sightline_geometry::camera::Camera;
+use sightline_geometry::cancel::Cancel;
+use sightline_geometry::error::{Error, Result};
+use sightline_geometry::frames::Point3;
+use sightline_vision::image::GrayImage;
+use sightline_vision::stereo::dense_stereo_until;
+
+use super::settings::HazardSettings;
+use crate::visual_odometry::reduce::Reduced;
+use crate::visual_odometry::windows::Eye;
+
+/// The points that a stereo pair shows, rover frame, m, row by row of the left image.
+///
+/// # Errors
+/// As [`dense_stereo_until`].
+pub fn range_points(
+    images: [&GrayImage; 2],
+    cameras: [&Camera; 2],
+    settings: &HazardSettings,
+    cancel: Cancel<'_>,
+) -> Result<Vec<Point3>> {
+    for (image, camera) in images.into_iter().zip(cameras) {
+        if <[u32; 2]>::from(image.dimensions()) != camera.size {
+            return Err(Error::Request("an image of the pair is not as large as its camera says".to_owned()));
+        }
+    }
+    let factor = cameras[0].size[0].div_ceil(settings.range_width_px).max(1);
+    let stereo = settings.stereo();
+    let dense = if factor == 1 {
+        dense_stereo_until(images, cameras, &stereo, cancel)?
+    } else {
+        let [left, right] = [0, 1].map(|k| Reduced::new(Eye { camera: cameras[k], image: images[k] }, factor));
+        dense_stereo_until([&left.image, &right.image], [&left.camera, &right.camera], &stereo, cancel)?
+    };
+    let found = dense.points_m.iter().filter(|point| point[0].is_finite());
+    Ok(found.map(|point| Point3::from(point.map(f64::from))).collect())
+}

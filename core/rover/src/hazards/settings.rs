@@ -1,0 +1,120 @@
+//! Settings of the hazard map: unit, default, range and source of each.
+//!
+//! A term is good up to `…_ok_…` and worst from `…_bad_…` on; between them its goodness falls linearly (`goodness.rs`).
+//! Sources: domain.md 8.2, whose values marked [M] are those commonly reported for MER.
+
+use sightline_geometry::error::{Error, Result};
+use sightline_track::limits::Domain;
+use sightline_track::settings_group;
+use sightline_vision::stereo::StereoSettings;
+
+settings_group! {
+    /// Settings of the hazard map.
+    HazardSettings as "hazards" {
+        /// Side of a cell. Smaller: rocks are sharper, and distant cells lack points.
+        cell_m: f64 = 0.10, "m", Domain::Between(0.05, 0.5), "ours; domain.md 8.2 has 0.20";
+        /// Side of the map, which wraps around the rover.
+        side_m: f64 = 16.0, "m", Domain::Between(4.0, 40.0), "ours; domain.md 8.2 has 10";
+        /// Radius of the disc under which the ground is assessed: half the width over the wheels with a margin.
+        rover_radius_m: f64 = 0.8, "m", Domain::Between(0.2, 2.0), "domain.md 8.2";
+        /// Distance of two cells up to which the difference of their heights is a step.
+        step_reach_m: f64 = 0.4, "m", Domain::Between(0.1, 1.0), "domain.md 8.2";
+        /// Tilt of the plane up to which it has full goodness.
+        tilt_ok_deg: f64 = 8.0, "deg", Domain::Between(0.0, 45.0), "domain.md 8.2";
+        /// Tilt from which on the goodness is 0.
+        tilt_bad_deg: f64 = 25.0, "deg", Domain::Between(1.0, 60.0), "domain.md 8.2";
+        /// RMS residual of the plane up to which it has full goodness.
+        roughness_ok_m: f64 = 0.04, "m", Domain::Between(0.0, 1.0), "domain.md 8.2";
+        /// RMS residual from which on the goodness is 0.
+        roughness_bad_m: f64 = 0.10, "m", Domain::Between(0.001, 2.0), "domain.md 8.2";
+        /// Step up to which it has full goodness.
+        step_ok_m: f64 = 0.08, "m", Domain::Between(0.0, 1.0), "domain.md 8.2";
+        /// Step from which on the goodness is 0.
+        step_bad_m: f64 = 0.20, "m", Domain::Between(0.001, 2.0), "domain.md 8.2";
+        /// Points in the disc from which on their number does not reduce the certainty.
+        points_full: f64 = 40.0, "", Domain::Between(3.0, 10_000.0), "domain.md 8.2";
+        /// A cell is known if its decayed number of points is at least this.
+        weight_min: f64 = 0.25, "", Domain::Between(0.001, 100.0), "ours";
+        /// A cell of less certainty is unknown.
+        certainty_min: f64 = 0.3, "", Domain::Between(0.0, 1.0), "domain.md 8.2";
+        /// Distance driven in which the number of points halves.
+        half_life_m: f64 = 5.0, "m", Domain::Between(0.1, 1000.0), "domain.md 8.2";
+        /// Nearest range of the stereo pair.
+        range_min_m: f64 = 0.4, "m", Domain::Between(0.1, 10.0), "ours";
+        /// Points farther from the left camera are left out: their error is larger than the terms.
+        range_max_m: f64 = 10.0, "m", Domain::Between(1.0, 100.0), "ours";
+        /// Points higher above the rover's origin are left out: it passes below them, or they are false matches.
+        height_max_m: f64 = 2.0, "m", Domain::Between(0.2, 20.0), "ours";
+        /// Images wider than this are reduced before stereo.
+        range_width_px: u32 = 256, "px", Domain::Between(64.0, 2048.0), "R9; flown width";
+        /// Cells nearer to the target count as good (target exemption); 0: none.
+        exemption_radius_m: f64 = 0.0, "m", Domain::Between(0.0, 5.0), "R100; off";
+        /// Unknown cells nearer to the start count as good …
+        start_radius_m: f64 = 2.0, "m", Domain::Between(0.0, 10.0), "R102";
+        /// … until the rover is this far from the start: the first map has no data under the rover.
+        start_distance_m: f64 = 2.0, "m", Domain::Between(0.0, 10.0), "R102";
+    }
+}
+
+impl HazardSettings {
+    /// Refuses values out of range, and limits that contradict each other.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] that names the setting and its range.
+    pub fn validate(&self) -> Result<()> {
+        let document = serde_json::to_value(self).map_err(|e| Error::setting("hazards", e.to_string()))?;
+        for info in Self::table() {
+            if let Some(problem) = info.problem_with(&document[&info.key]) {
+                return Err(Error::setting(info.key, problem));
+            }
+        }
+        for (ok, bad, key) in [
+            (self.tilt_ok_deg, self.tilt_bad_deg, "tilt_ok_deg"),
+            (self.roughness_ok_m, self.roughness_bad_m, "roughness_ok_m"),
+            (self.step_ok_m, self.step_bad_m, "step_ok_m"),
+            (self.range_min_m, self.range_max_m, "range_min_m"),
+        ] {
+            if ok >= bad {
+                return Err(Error::setting(key, format!("{ok} must be less than {bad}, the upper limit")));
+            }
+        }
+        if self.rover_radius_m < 2.0 * self.cell_m {
+            let problem = format!("must be at least two cells of {} m", self.cell_m);
+            return Err(Error::setting("rover_radius_m", problem));
+        }
+        Ok(())
+    }
+
+    /// Cells along a side of the map, an even number.
+    pub(super) fn side_cells(&self) -> usize {
+        2 * (0.5 * self.side_m / self.cell_m).round() as usize
+    }
+
+    /// Settings of dense stereo for the points of the map.
+    pub(super) fn stereo(&self) -> StereoSettings {
+        StereoSettings {
+            range_min_m: self.range_min_m,
+            range_max_m: self.range_max_m,
+            speckle_px: 64,
+            ..StereoSettings::default()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn defaults_are_valid_and_contradictions_are_refused() {
+        assert!(HazardSettings::default().validate().is_ok());
+        let refused = |change: fn(&mut HazardSettings)| {
+            let mut settings = HazardSettings::default();
+            change(&mut settings);
+            settings.validate().map_err(|error| error.to_string()).unwrap_err()
+        };
+        assert!(refused(|s| s.cell_m = f64::NAN).contains("cell_m"));
+        assert!(refused(|s| s.tilt_ok_deg = 30.0).contains("tilt_ok_deg"));
+        assert!(refused(|s| (s.rover_radius_m, s.cell_m) = (0.3, 0.2)).contains("two cells"));
+    }
+}

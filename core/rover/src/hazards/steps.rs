@@ -1,0 +1,135 @@
+//! Steps: the largest difference of the mean heights of two cells near each other, both inside the disc.
+//!
+//! ```text
+//! step(p) = max |z̄(c) − z̄(c + o)|      c ∈ D_p ∩ (D_p − o),  0 < |o| ≤ reach
+//! ```
+//! For each offset o the differences form one image, and the maximum over the intersection of both discs is taken row by
+//! row: a run of l cells is covered by two runs of 2^k ≤ l, whose maxima are computed once for the whole image.
+//!
+//! | symbol | meaning |
+//! |---|---|
+//! | z̄(c) | mean height of the points of cell c, m |
+//! | D_p | disc of the rover's radius around cell p |
+//!
+//! Source: domain.md 8.2.
+
+use rayon::prelude::*;
+
+use super::grid::Disc;
+use super::map::HazardMap;
+
+/// The largest step in the disc around every cell, row by row, m; 0 where no two cells are known.
+pub(super) fn steps(map: &HazardMap, disc: &Disc, reach: &Disc, weight_min: f64) -> Vec<f32> {
+    let side = map.grid.side;
+    let heights: Vec<f32> = (0..side * side)
+        .map(|index| {
+            let cell = map.cell(index / side, index % side);
+            if cell.count() >= weight_min { cell.mean_height_m() as f32 } else { f32::NAN }
+        })
+        .collect();
+    let offsets: Vec<[isize; 2]> = (0..=reach.rows())
+        .flat_map(|row| {
+            let half = reach.half_width(row).unwrap_or(-1);
+            // One of each pair of opposite offsets.
+            (-half..=half).map(move |column| [row, column])
+        })
+        .filter(|[row, column]| *row > 0 || *column > 0)
+        .collect();
+    let larger = |mut a: Vec<f32>, b: Vec<f32>| {
+        raise(&mut a, &b);
+        a
+    };
+    let nothing = || vec![0.0; side * side];
+    offsets.into_par_iter().map(|offset| largest(&heights, side, offset, disc)).reduce(nothing, larger)
+}
+
+/// Replaces every value by the larger one of the two.
+#[inline]
+fn raise(values: &mut [f32], others: &[f32]) {
+    for (value, other) in values.iter_mut().zip(others) {
+        *value = if *other > *value { *other } else { *value };
+    }
+}
+
+/// The largest difference over all pairs of one offset, in the disc around every cell.
+fn largest(heights: &[f32], side: usize, offset: [isize; 2], disc: &Disc) -> Vec<f32> {
+    let margin = disc.rows() as usize;
+    let width = side + 2 * margin;
+    let runs = Runs::new(differences(heights, side, offset, margin), width, margin);
+    let mut steps = vec![0.0f32; side * side];
+    for (row, steps) in steps.chunks_exact_mut(side).enumerate() {
+        for beside in -disc.rows()..=disc.rows() {
+            let (Some(row), Some(own), Some(other)) = (
+                row.checked_add_signed(beside).filter(|row| *row < side),
+                disc.half_width(beside),
+                disc.half_width(beside + offset[0]),
+            ) else {
+                continue;
+            };
+            let (low, high) = ((-own).max(-other - offset[1]), own.min(other - offset[1]));
+            if low <= high {
+                runs.raise_row(steps, row, [low, high]);
+            }
+        }
+    }
+    steps
+}
+
+/// |z̄(c) − z̄(c + o)| with a margin of zeros on both sides of every row; 0 if one of the cells is unknown.
+fn differences(heights: &[f32], side: usize, [down, along]: [isize; 2], margin: usize) -> Vec<f32> {
+    let width = side + 2 * margin;
+    let mut differences = vec![0.0f32; side * width];
+    for (row, line) in differences.chunks_exact_mut(width).enumerate() {
+        let other = row + down as usize;
+        if other >= side {
+            break;
+        }
+        let (own, other) = (&heights[row * side..(row + 1) * side], &heights[other * side..(other + 1) * side]);
+        let from = (-along).max(0) as usize;
+        let to = (side as isize - along.max(0)) as usize;
+        let partners = &other[(from as isize + along) as usize..];
+        let line = &mut line[margin + from..margin + to];
+        for ((difference, a), b) in line.iter_mut().zip(&own[from..to]).zip(partners) {
+            let height = (a - b).abs();
+            *difference = if height > 0.0 { height } else { 0.0 };
+        }
+    }
+    differences
+}
+
+/// Maxima of an image over runs of 1, 2, 4 … pixels of a row, by the first pixel of the run.
+struct Runs {
+    levels: Vec<Vec<f32>>,
+    width: usize,
+    margin: usize,
+}
+
+impl Runs {
+    fn new(image: Vec<f32>, width: usize, margin: usize) -> Self {
+        let mut levels = vec![image];
+        let mut length = 1;
+        while 2 * length <= 2 * margin + 1 {
+            let mut doubled = levels[levels.len() - 1].clone();
+            let before = &levels[levels.len() - 1];
+            for (line, before) in doubled.chunks_exact_mut(width).zip(before.chunks_exact(width)) {
+                raise(line, &before[length..]);
+            }
+            levels.push(doubled);
+            length *= 2;
+        }
+        Self { levels, width, margin }
+    }
+
+    /// Raises the values of a row to the maxima over columns `low` to `high` beside each.
+    fn raise_row(&self, values: &mut [f32], row: usize, [low, high]: [isize; 2]) {
+        let length = (high - low + 1) as usize;
+        let level = length.ilog2() as usize;
+        let line = &self.levels[level][row * self.width..(row + 1) * self.width];
+        let first = (self.margin as isize + low) as usize;
+        raise(values, &line[first..]);
+        let second = first + length - (1 << level);
+        if second > first {
+            raise(values, &line[second..]);
+        }
+    }
+}
