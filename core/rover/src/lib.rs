@@ -16,5 +16,6 @@ pub mod designate;
 pub mod trackability;
 pub mod driving;
 pub mod hazards;
+pub mod navigation;
 pub mod visual_odometry;
 pub mod version;

@@ -8,7 +8,7 @@ use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
 use sightline_geometry::frames::Pixel;
 
-use super::select_path::Motion;
+use super::motion::Motion;
 use crate::pipeline::Stops;
 use crate::visual_odometry::MeasuredMotion;
 

@@ -23,7 +23,7 @@ use utoipa::ToSchema;
 use sightline_geometry::frames::Pose;
 use sightline_geometry::odometry_error::{OdometryError, PoseChangeError};
 
-use super::select_path::Motion;
+use super::motion::Motion;
 
 /// A place of the rover in the level, with its covariance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]

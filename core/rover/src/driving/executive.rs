@@ -20,8 +20,9 @@ use super::active_world::{ActiveWorld, DriveReport};
 use super::command::{ArrivalAction, DriveCommand, GoalRule, TrackedStops};
 use super::dead_reckoning::Reckoned;
 use super::flight_time::FlightTime;
+use super::motion::Motion;
 use super::odometry::{self, OdometryPair};
-use super::select_path::{Motion, Navigator};
+use super::select_path::{Navigator, PathInput};
 use super::set_goal::{Goal, set_goal};
 use crate::pipeline::{self, StepChanges, Stops};
 use crate::visual_odometry::{OdometryMode, pose_change_error};
@@ -212,10 +213,21 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
     if cycle.ending.is_none() && !goal.arrived {
         let target_in_rover = pose.inverse_transform_point(&target_in_site);
         let distance_m = (target_in_rover - left.model.centre()).norm();
-        let motion = input.navigator.select_path(goal.in_rover_m, step_m(input, distance_m));
-        let (motion, is_part) = followable(motion, input.command, slip_to(stops, step));
-        cycle.motion = Some(motion);
-        cycle.odometry_alone = is_part && input.command.tracked_stops == TrackedStops::ByDistance;
+        let choice = input.navigator.select_path(&PathInput {
+            goal_m: goal.in_rover_m,
+            step_m: step_m(input, distance_m),
+            curvature_per_m: input
+                .before
+                .and_then(|before| before.motion)
+                .map_or(0.0, |m| m.curvature_per_m()),
+            map: None,
+            site_from_rover: &pose,
+        });
+        if let Some(motion) = choice.motion() {
+            let (motion, is_part) = followable(motion, input.command, slip_to(stops, step));
+            cycle.motion = Some(motion);
+            cycle.odometry_alone = is_part && input.command.tracked_stops == TrackedStops::ByDistance;
+        }
     }
     cycle
 }

@@ -15,49 +15,31 @@
 //!
 //! Frame: rover, horizontal. Sources: papers.md R104, R107; the rule is ours.
 
-use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
+use sightline_geometry::frames::Pose;
 
-/// One motion of the rover.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(tag = "kind", rename_all = "snake_case")]
-pub enum Motion {
-    /// Along a circle or straight ahead.
-    Arc {
-        /// Length of the path of the rover's origin, m; negative: backwards.
-        length_m: f64,
-        /// Curvature, 1/m; positive to the right, 0 straight ahead.
-        curvature_per_m: f64,
-    },
-    /// On the spot.
-    Turn {
-        /// Angle, rad, positive to the right.
-        angle_rad: f64,
-    },
-}
+use super::motion::Motion;
+use super::path_choice::{Candidate, PathChoice};
+use crate::hazards::goodness::GoodnessMap;
 
-impl Motion {
-    /// Where the rover is after a part of the motion, 0 to 1, on level ground without slip: ahead and to the right of its
-    /// start, m, and turned to the right, rad.
-    pub fn after(&self, part: f64) -> ([f64; 2], f64) {
-        match *self {
-            Self::Turn { angle_rad } => ([0.0; 2], part * angle_rad),
-            Self::Arc { length_m, curvature_per_m } => {
-                let (length_m, turn_rad) = (part * length_m, part * length_m * curvature_per_m);
-                // Of a circle so wide the difference from a straight line is below rounding.
-                if turn_rad.abs() < 1e-9 {
-                    return ([length_m, 0.0], turn_rad);
-                }
-                ([turn_rad.sin() / curvature_per_m, (1.0 - turn_rad.cos()) / curvature_per_m], turn_rad)
-            }
-        }
-    }
+/// What a navigator decides from.
+#[derive(Clone, Copy, Debug)]
+pub struct PathInput<'a> {
+    /// The goal ahead and to the right of the rover, m; it is not reached yet.
+    pub goal_m: [f64; 2],
+    /// Largest length of the motion, m.
+    pub step_m: f64,
+    /// Curvature of the motion before, 1/m, positive to the right; 0 at the first stop and after a turn.
+    pub curvature_per_m: f64,
+    /// The goodness map of this stop; `None` without range data.
+    pub map: Option<&'a GoodnessMap>,
+    /// The pose estimate.
+    pub site_from_rover: &'a Pose,
 }
 
 /// Chooses the next motion.
 pub trait Navigator {
-    /// A motion towards a goal ahead and to the right of the rover, m, of at most `step_m`; the goal is not reached yet.
-    fn select_path(&self, goal_m: [f64; 2], step_m: f64) -> Motion;
+    /// The motion towards the goal, with every path that was considered; no motion if no path is safe.
+    fn select_path(&self, input: &PathInput<'_>) -> PathChoice;
 }
 
 /// A navigator without a hazard map.
@@ -75,8 +57,9 @@ impl Default for ArcNavigator {
     }
 }
 
-impl Navigator for ArcNavigator {
-    fn select_path(&self, [x, y]: [f64; 2], step_m: f64) -> Motion {
+impl ArcNavigator {
+    /// The motion towards a goal ahead and to the right of the rover, m, of at most `step_m`.
+    pub fn motion(&self, [x, y]: [f64; 2], step_m: f64) -> Motion {
         let distance_m = x.hypot(y);
         let is_reverse = x < 0.0 && distance_m <= self.reverse_max_m;
         // Backwards, the circle is that of the mirrored goal.
@@ -95,38 +78,20 @@ impl Navigator for ArcNavigator {
     }
 }
 
+impl Navigator for ArcNavigator {
+    fn select_path(&self, input: &PathInput<'_>) -> PathChoice {
+        PathChoice::only(Candidate::unjudged(self.motion(input.goal_m, input.step_m)))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn the_end_of_a_motion_is_that_of_many_small_ones() {
-        for motion in [
-            Motion::Arc { length_m: 2.0, curvature_per_m: 0.4 },
-            Motion::Arc { length_m: -1.0, curvature_per_m: -0.3 },
-            Motion::Arc { length_m: 1.5, curvature_per_m: 0.0 },
-            Motion::Turn { angle_rad: -0.8 },
-        ] {
-            let (length_m, turn_rad) = match motion {
-                Motion::Arc { length_m, curvature_per_m } => (length_m, length_m * curvature_per_m),
-                Motion::Turn { angle_rad } => (0.0, angle_rad),
-            };
-            let (mut place, mut heading_rad) = ([0.0f64; 2], 0.0f64);
-            for _ in 0..100_000 {
-                let half = heading_rad + 0.5e-5 * turn_rad;
-                place = [place[0] + 1e-5 * length_m * half.cos(), place[1] + 1e-5 * length_m * half.sin()];
-                heading_rad += 1e-5 * turn_rad;
-            }
-            let (end, turned_rad) = motion.after(1.0);
-            assert!((end[0] - place[0]).hypot(end[1] - place[1]) < 1e-9, "{motion:?}: {end:?} {place:?}");
-            assert!((turned_rad - heading_rad).abs() < 1e-9);
-        }
-    }
-
-    #[test]
     fn an_arc_that_is_long_enough_ends_in_the_goal() {
         for goal in [[3.0, 0.4], [0.8, -0.1], [5.0, 0.0], [-0.3, 0.001], [-0.2, 0.0]] {
-            let motion = ArcNavigator::default().select_path(goal, 100.0);
+            let motion = ArcNavigator::default().motion(goal, 100.0);
             let ([x, y], _) = motion.after(1.0);
             assert!((x - goal[0]).hypot(y - goal[1]) < 1e-12, "{goal:?}: {motion:?} ends at {x} {y}");
         }
@@ -145,7 +110,7 @@ mod tests {
             }
             let (sine, cosine) = heading_rad.sin_cos();
             let seen = [cosine * dx + sine * dy, cosine * dy - sine * dx];
-            let motion = ArcNavigator::default().select_path(seen, 0.3);
+            let motion = ArcNavigator::default().motion(seen, 0.3);
             if let Motion::Arc { length_m, .. } = motion {
                 assert!(length_m.abs() <= 0.3);
             }
@@ -160,7 +125,7 @@ mod tests {
     #[test]
     fn a_goal_beside_or_far_behind_is_faced_first() {
         for (goal, deg) in [([0.0, 2.0], 90.0), ([-3.0, 0.1], 178.1), ([1.0, -1.0], -45.0)] {
-            let Motion::Turn { angle_rad } = ArcNavigator::default().select_path(goal, 1.0) else {
+            let Motion::Turn { angle_rad } = ArcNavigator::default().motion(goal, 1.0) else {
                 panic!("no turn for {goal:?}");
             };
             assert!((angle_rad.to_degrees() - deg).abs() < 0.1, "{}", angle_rad.to_degrees());

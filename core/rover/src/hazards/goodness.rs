@@ -199,7 +199,8 @@ impl GoodnessCell {
     fn with_rules(self, at_m: [f64; 2], rules: &MapRules) -> Self {
         let basis = if rules.exemption.is_some_and(|circle| circle.contains(at_m)) {
             CellBasis::Exempt
-        } else if self.basis == CellBasis::Unknown && rules.start.is_some_and(|circle| circle.contains(at_m)) {
+        } else if self.basis == CellBasis::Unknown && rules.start.is_some_and(|circle| circle.contains(at_m))
+        {
             CellBasis::Assumed
         } else {
             return self;
@@ -210,8 +211,8 @@ impl GoodnessCell {
 
 /// Assesses every cell of a hazard map.
 pub fn assess(map: &HazardMap, rules: &MapRules, settings: &HazardSettings) -> GoodnessMap {
-    let [disc, reach] =
-        [settings.rover_radius_m, settings.step_reach_m].map(|radius_m| Disc::new(radius_m / map.grid.cell_m));
+    let [disc, reach] = [settings.rover_radius_m, settings.step_reach_m]
+        .map(|radius_m| Disc::new(radius_m / map.grid.cell_m));
     let (sums, steps) = rayon::join(
         || disc_sums(map, &disc, settings.weight_min),
         || steps(map, &disc, &reach, settings.weight_min),

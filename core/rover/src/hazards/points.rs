@@ -36,7 +36,8 @@ pub fn range_points(
     let dense = if factor == 1 {
         dense_stereo_until(images, cameras, &stereo, cancel)?
     } else {
-        let [left, right] = [0, 1].map(|k| Reduced::new(Eye { camera: cameras[k], image: images[k] }, factor));
+        let [left, right] =
+            [0, 1].map(|k| Reduced::new(Eye { camera: cameras[k], image: images[k] }, factor));
         dense_stereo_until([&left.image, &right.image], [&left.camera, &right.camera], &stereo, cancel)?
     };
     let found = dense.points_m.iter().filter(|point| point[0].is_finite());

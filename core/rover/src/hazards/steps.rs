@@ -84,7 +84,8 @@ fn differences(heights: &[f32], side: usize, [down, along]: [isize; 2], margin: 
         if other >= side {
             break;
         }
-        let (own, other) = (&heights[row * side..(row + 1) * side], &heights[other * side..(other + 1) * side]);
+        let (own, other) =
+            (&heights[row * side..(row + 1) * side], &heights[other * side..(other + 1) * side]);
         let from = (-along).max(0) as usize;
         let to = (side as isize - along.max(0)) as usize;
         let partners = &other[(from as isize + along) as usize..];

@@ -1,0 +1,248 @@
+//! Tests of the hazard map against planes, steps and a reference that visits every cell of every disc.
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+use sightline_geometry::frames::{Point3, Pose, attitude_from_roll_pitch_yaw};
+
+use super::*;
+
+/// Points of a height function on a lattice of `spacing` within `reach` of a position, site frame.
+fn points(middle: [f64; 2], reach: f64, spacing: f64, height: impl Fn(f64, f64) -> f64) -> Vec<Point3> {
+    let count = (2.0 * reach / spacing) as i32;
+    let at = |k: i32, middle: f64| middle - reach + (f64::from(k) + 0.5) * spacing;
+    (0..count)
+        .flat_map(|row| (0..count).map(move |column| (row, column)))
+        .map(|(row, column)| (at(row, middle[0]), at(column, middle[1])))
+        .map(|(x, y)| Point3::new(x, y, height(x, y)))
+        .collect()
+}
+
+fn pose(x: f64, y: f64) -> Pose {
+    Pose::translation(x, y, 0.0)
+}
+
+/// A map of points in the site frame, seen from a pose.
+fn mapped(
+    before: Option<&HazardMap>,
+    points: &[Point3],
+    site_from_rover: &Pose,
+    driven_m: f64,
+    settings: &HazardSettings,
+) -> HazardMap {
+    let in_rover: Vec<Point3> = points.iter().map(|p| site_from_rover.inverse_transform_point(p)).collect();
+    map_hazards(before, &Scan { points_in_rover: &in_rover, site_from_rover, driven_m }, settings)
+}
+
+fn assessed(height: impl Fn(f64, f64) -> f64) -> GoodnessMap {
+    let settings = HazardSettings::default();
+    let map = mapped(None, &points([0.0, 0.0], 4.0, 0.03, height), &pose(0.0, 0.0), 0.0, &settings);
+    assess(&map, &MapRules::default(), &settings)
+}
+
+#[test]
+fn a_tilted_plane_has_its_tilt_in_every_cell() {
+    for deg in [0.0f64, 6.0, 15.0, 24.0] {
+        let slope = deg.to_radians().tan();
+        let map = assessed(|x, y| slope * (0.6 * x + 0.8 * y));
+        for at in [[0.0, 0.0], [1.2, -2.0], [-2.5, 2.5]] {
+            let cell = map.cell_at(at).unwrap();
+            assert_eq!(cell.basis, CellBasis::Measured);
+            assert!((f64::from(cell.tilt_deg) - deg).abs() < 1e-4, "{cell:?}");
+            assert!(cell.roughness_m < 1e-5);
+            // Two and three cells apart, two cells are 0.36 m apart along the fall line.
+            let step = f64::from(cell.step_m);
+            assert!(step <= 0.4 * slope + 1e-6 && step >= 0.34 * slope, "{step} {slope}");
+        }
+    }
+}
+
+#[test]
+fn a_box_is_a_step_within_the_rovers_radius_of_it() {
+    let map = assessed(|x, y| if x.abs() < 0.25 && y.abs() < 0.25 { -0.3 } else { 0.0 });
+    for (at, expected) in [([0.0, 0.0], 0.3), ([0.95, 0.05], 0.3), ([1.2, 0.05], 0.0), ([0.9, 0.9], 0.0)] {
+        let cell = map.cell_at(at).unwrap();
+        assert!((f64::from(cell.step_m) - expected).abs() < 1e-6, "{at:?}: {cell:?}");
+        assert_eq!(cell.goodness == 0.0, expected > 0.0);
+    }
+    let (term, value) = map.cell_at([0.95, 0.05]).unwrap().limiting(&map.settings).unwrap();
+    assert_eq!(term, HazardTerm::Step);
+    assert!((value - 0.3).abs() < 1e-6);
+    assert!(map.cell_at([2.0, 2.0]).unwrap().limiting(&map.settings).is_none());
+}
+
+#[test]
+fn a_chequered_surface_is_rough_but_level() {
+    let height = |x: f64, y: f64| {
+        let is_up = ((x / 0.03).floor() + (y / 0.03).floor()).rem_euclid(2.0) < 0.5;
+        if is_up { -0.06 } else { 0.06 }
+    };
+    let cell = *assessed(height).cell_at([0.5, 0.5]).unwrap();
+    assert!((cell.roughness_m - 0.06).abs() < 1e-3 && cell.tilt_deg < 0.5, "{cell:?}");
+    assert!(cell.goodness > 0.0 && cell.goodness < 0.8);
+}
+
+#[test]
+fn sums_and_steps_are_those_of_a_visit_of_every_cell() {
+    let settings = HazardSettings { side_m: 5.0, weight_min: 1.0, ..HazardSettings::default() };
+    let mut random = Pcg64::seed_from_u64(3);
+    // Holes as well: about a third of the cells have no point.
+    let scattered: Vec<Point3> = (0..3000)
+        .map(|_| {
+            let mut next = |from: f64, to: f64| random.random_range(from..to);
+            Point3::new(next(-2.6, 2.6), next(-2.6, 2.6), next(-0.2, 0.2))
+        })
+        .collect();
+    let map = mapped(None, &scattered, &pose(0.04, -0.02), 0.0, &settings);
+    let assessed = assess(&map, &MapRules::default(), &settings);
+    let grid = map.grid();
+    let side = grid.side as i64;
+    for index in (0..grid.len()).step_by(7) {
+        let [row, column] = [index as i64 / side, index as i64 % side];
+        let inside = |d: &[i64; 2]| ((d[0] * d[0] + d[1] * d[1]) as f64).sqrt() * grid.cell_m <= 0.8 + 1e-9;
+        let disc: Vec<[i64; 2]> = (-8..=8)
+            .flat_map(|a| (-8..=8).map(move |b| [a, b]))
+            .filter(inside)
+            .map(|[a, b]| [row + a, column + b])
+            .filter(|cell| cell.iter().all(|number| (0..side).contains(number)))
+            .collect();
+        let mean = |cell: &[i64; 2]| {
+            let cell = map.cell(cell[0] as usize, cell[1] as usize);
+            (cell.count() >= 1.0).then(|| cell.mean_height_m())
+        };
+        let mut step = 0.0f64;
+        for a in &disc {
+            for b in &disc {
+                let apart = (((a[0] - b[0]).pow(2) + (a[1] - b[1]).pow(2)) as f64).sqrt() * grid.cell_m;
+                if let (Some(a), Some(b), true) = (mean(a), mean(b), apart <= 0.4 + 1e-9) {
+                    step = step.max((a - b).abs());
+                }
+            }
+        }
+        let count: f64 = disc.iter().map(|c| map.cell(c[0] as usize, c[1] as usize).count()).sum();
+        let known = disc.iter().filter(|cell| mean(cell).is_some()).count() as f64 / 197.0;
+        let cell = &assessed.cells[index];
+        assert!((f64::from(cell.step_m) - step).abs() < 1e-6, "{index}: {} {step}", cell.step_m);
+        assert!((f64::from(cell.certainty) - (count / 40.0).min(1.0) * known).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn a_map_that_wrapped_around_is_a_fresh_one() {
+    let settings = HazardSettings { side_m: 8.0, ..HazardSettings::default() };
+    let height = |x: f64, y: f64| 0.1 * (1.3 * x).sin() * (0.9 * y).cos();
+    let seen = points([6.3, -2.1], 3.9, 0.05, height);
+    // Elsewhere first, then 12 m without a point: the window has wrapped and nothing is left.
+    let elsewhere = mapped(None, &points([0.0, 0.0], 3.0, 0.1, height), &pose(-7.0, 3.0), 0.0, &settings);
+    let moved = mapped(Some(&elsewhere), &seen, &pose(6.3, -2.1), 20.0, &settings);
+    let fresh = mapped(None, &seen, &pose(6.3, -2.1), 20.0, &settings);
+    assert_eq!(moved, fresh);
+    // In steps of 0.7 m, with the points added at the end.
+    let mut wandering = mapped(None, &[], &pose(0.0, 0.0), 0.0, &settings);
+    for k in 1..=9 {
+        wandering = mapped(Some(&wandering), &[], &pose(0.7 * f64::from(k), -0.2), f64::from(k), &settings);
+    }
+    let wandering = mapped(Some(&wandering), &seen, &pose(6.3, -2.1), 20.0, &settings);
+    let assess = |map| assess(map, &MapRules::default(), &settings);
+    assert_eq!(assess(&wandering).cells, assess(&fresh).cells);
+}
+
+#[test]
+fn points_decay_by_half_in_their_half_life() {
+    let settings = HazardSettings::default();
+    let seen = points([0.0, 0.0], 0.5, 0.05, |_, _| 0.0);
+    let first = mapped(None, &seen, &pose(0.0, 0.0), 0.0, &settings);
+    let count = |map: &HazardMap| {
+        let side = map.grid().side;
+        (0..side * side).map(|index| map.cell(index / side, index % side).count()).sum::<f64>()
+    };
+    let later = mapped(Some(&first), &[], &pose(2.0, 0.0), 5.0, &settings);
+    assert!((count(&later) - 0.5 * count(&first)).abs() < 1e-9);
+    let goodness = assess(&later, &MapRules::default(), &settings);
+    let cell = goodness.cell_at([0.0, 0.0]).unwrap();
+    assert!((cell.age_m - 5.0).abs() < 1e-4, "{cell:?}");
+    let both = mapped(Some(&later), &seen, &pose(2.0, 0.0), 5.0, &settings);
+    let age = assess(&both, &MapRules::default(), &settings).cell_at([0.0, 0.0]).unwrap().age_m;
+    assert!((age - 5.0 / 3.0).abs() < 1e-4, "{age}");
+}
+
+#[test]
+fn what_left_the_view_is_kept_and_what_left_the_window_is_not() {
+    let settings = HazardSettings { side_m: 8.0, ..HazardSettings::default() };
+    let rock = points([1.5, 0.0], 0.3, 0.03, |_, _| -0.4);
+    let ground = points([1.5, 0.0], 1.5, 0.03, |_, _| 0.0);
+    let first = mapped(None, &[rock, ground].concat(), &pose(0.0, 0.0), 0.0, &settings);
+    let passed = mapped(Some(&first), &[], &pose(3.0, 0.0), 3.0, &settings);
+    let goodness = |map: &HazardMap| assess(map, &MapRules::default(), &settings);
+    assert_eq!(goodness(&passed).cell_at([1.5, 0.0]).unwrap().goodness, 0.0);
+    assert_eq!(goodness(&passed).cell_at([1.5, 0.0]).unwrap().basis, CellBasis::Measured);
+    let far = mapped(Some(&passed), &[], &pose(9.0, 0.0), 9.0, &settings);
+    let back = mapped(Some(&far), &[], &pose(2.0, 0.0), 16.0, &settings);
+    assert_eq!(goodness(&back).cell_at([1.5, 0.0]).unwrap().basis, CellBasis::Unknown);
+}
+
+#[test]
+fn cells_near_an_exempt_target_count_as_good() {
+    let settings = HazardSettings { exemption_radius_m: 1.0, ..HazardSettings::default() };
+    let seen = points([0.0, 0.0], 3.0, 0.03, |x, y| if x.hypot(y) < 0.3 { -0.4 } else { 0.0 });
+    let map = mapped(None, &seen, &pose(0.0, 0.0), 0.0, &settings);
+    let rules = MapRules::at([0.0, 0.0], [-9.0, 0.0], Some([0.5, 0.0]), &settings);
+    assert_eq!(rules.start, None);
+    let exempt = assess(&map, &rules, &settings);
+    let [near, beyond] = [[0.9, 0.0], [-0.8, 0.0]].map(|at| *exempt.cell_at(at).unwrap());
+    assert_eq!((near.basis, near.goodness), (CellBasis::Exempt, 1.0));
+    assert!(near.step_m > 0.3, "the terms stay for display");
+    assert_eq!((beyond.basis, beyond.goodness), (CellBasis::Measured, 0.0));
+    let off = MapRules::at([0.0, 0.0], [0.0, 0.0], Some([0.5, 0.0]), &HazardSettings::default());
+    assert_eq!(off.exemption, None);
+}
+
+#[test]
+fn unknown_cells_near_the_start_are_assumed_good_for_2_m() {
+    let settings = HazardSettings::default();
+    let map = mapped(None, &[], &pose(0.0, 0.0), 0.0, &settings);
+    let at = |rover: [f64; 2]| assess(&map, &MapRules::at(rover, [0.0, 0.0], None, &settings), &settings);
+    let first = at([0.0, 0.0]);
+    assert_eq!(first.cell_at([1.5, 0.5]).unwrap().basis, CellBasis::Assumed);
+    assert_eq!(first.cell_at([1.5, 0.5]).unwrap().goodness, 1.0);
+    assert_eq!(first.cell_at([2.2, 0.0]).unwrap().basis, CellBasis::Unknown);
+    assert_eq!(at([2.1, 0.0]).cell_at([1.5, 0.5]).unwrap().basis, CellBasis::Unknown);
+}
+
+#[test]
+fn a_cell_with_few_points_is_unknown() {
+    let settings = HazardSettings::default();
+    let sparse = mapped(None, &points([0.0, 0.0], 2.0, 0.35, |_, _| 0.0), &pose(0.0, 0.0), 0.0, &settings);
+    let cell = *assess(&sparse, &MapRules::default(), &settings).cell_at([0.0, 0.0]).unwrap();
+    assert_eq!((cell.basis, cell.goodness), (CellBasis::Unknown, 0.0));
+    assert!(cell.certainty > 0.0 && f64::from(cell.certainty) < settings.certainty_min);
+    assert_eq!(cell.limiting(&settings).unwrap().0, HazardTerm::Unknown);
+}
+
+#[test]
+fn points_high_above_the_rover_are_left_out() {
+    let settings = HazardSettings::default();
+    let overhang = points([0.0, 0.0], 1.0, 0.05, |_, _| -3.0);
+    let map = mapped(None, &overhang, &pose(0.0, 0.0), 0.0, &settings);
+    assert_eq!(map, mapped(None, &[], &pose(0.0, 0.0), 0.0, &settings));
+}
+
+#[test]
+fn points_enter_the_map_by_the_pose() {
+    let settings = HazardSettings::default();
+    let tilted = Pose::from_parts([2.0, -1.0, 0.4].into(), attitude_from_roll_pitch_yaw(0.05, 0.1, 0.7));
+    let seen = points([2.0, -1.0], 2.0, 0.04, |x, _| 0.1 * x);
+    let map = mapped(None, &seen, &tilted, 0.0, &settings);
+    let cell = *assess(&map, &MapRules::default(), &settings).cell_at([2.0, -1.0]).unwrap();
+    assert!((f64::from(cell.tilt_deg) - 0.1f64.atan().to_degrees()).abs() < 1e-4, "{cell:?}");
+}
+
+#[test]
+fn a_stored_map_is_restored_bit_for_bit() {
+    let settings = HazardSettings::default();
+    let seen = points([1.0, 0.0], 2.0, 0.09, |x, y| 0.07 * (3.0 * x + y).sin());
+    let map = mapped(None, &seen, &pose(0.3, 0.2), 1.7, &settings);
+    let text = serde_json::to_string(&map).unwrap();
+    assert_eq!(serde_json::from_str::<HazardMap>(&text).unwrap(), map);
+    assert!(serde_json::from_str::<HazardMap>(&text.replace("\"side\":160", "\"side\":0")).is_err());
+}

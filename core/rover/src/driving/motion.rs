@@ -1,0 +1,88 @@
+//! A motion of the rover: an arc of a circle or a turn in place.
+//!
+//! ```text
+//! x(s) = sin(κ s)/κ      y(s) = (1 − cos(κ s))/κ      ψ(s) = κ s
+//! ```
+//!
+//! | symbol | name | unit, frame |
+//! |---|---|---|
+//! | s, κ | part of `length_m`, `curvature_per_m` (positive to the right) | m, 1/m |
+//! | x, y, ψ | position ahead and to the right of the start, heading | m, rad |
+//!
+//! Frame: rover at the start of the motion, horizontal.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// One motion of the rover.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Motion {
+    /// Along a circle or straight ahead.
+    Arc {
+        /// Length of the path of the rover's origin, m; negative: backwards.
+        length_m: f64,
+        /// Curvature, 1/m; positive to the right, 0 straight ahead.
+        curvature_per_m: f64,
+    },
+    /// On the spot.
+    Turn {
+        /// Angle, rad, positive to the right.
+        angle_rad: f64,
+    },
+}
+
+impl Motion {
+    /// Curvature, 1/m, positive to the right; 0 of a turn in place.
+    pub(crate) fn curvature_per_m(&self) -> f64 {
+        match *self {
+            Self::Arc { curvature_per_m, .. } => curvature_per_m,
+            Self::Turn { .. } => 0.0,
+        }
+    }
+
+    /// Where the rover is after a part of the motion, 0 to 1, on level ground without slip: ahead and to the right of its
+    /// start, m, and turned to the right, rad.
+    pub fn after(&self, part: f64) -> ([f64; 2], f64) {
+        match *self {
+            Self::Turn { angle_rad } => ([0.0; 2], part * angle_rad),
+            Self::Arc { length_m, curvature_per_m } => {
+                let (length_m, turn_rad) = (part * length_m, part * length_m * curvature_per_m);
+                // Of a circle so wide the difference from a straight line is below rounding.
+                if turn_rad.abs() < 1e-9 {
+                    return ([length_m, 0.0], turn_rad);
+                }
+                ([turn_rad.sin() / curvature_per_m, (1.0 - turn_rad.cos()) / curvature_per_m], turn_rad)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_end_of_a_motion_is_that_of_many_small_ones() {
+        for motion in [
+            Motion::Arc { length_m: 2.0, curvature_per_m: 0.4 },
+            Motion::Arc { length_m: -1.0, curvature_per_m: -0.3 },
+            Motion::Arc { length_m: 1.5, curvature_per_m: 0.0 },
+            Motion::Turn { angle_rad: -0.8 },
+        ] {
+            let (length_m, turn_rad) = match motion {
+                Motion::Arc { length_m, curvature_per_m } => (length_m, length_m * curvature_per_m),
+                Motion::Turn { angle_rad } => (0.0, angle_rad),
+            };
+            let (mut place, mut heading_rad) = ([0.0f64; 2], 0.0f64);
+            for _ in 0..100_000 {
+                let half = heading_rad + 0.5e-5 * turn_rad;
+                place = [place[0] + 1e-5 * length_m * half.cos(), place[1] + 1e-5 * length_m * half.sin()];
+                heading_rad += 1e-5 * turn_rad;
+            }
+            let (end, turned_rad) = motion.after(1.0);
+            assert!((end[0] - place[0]).hypot(end[1] - place[1]) < 1e-9, "{motion:?}: {end:?} {place:?}");
+            assert!((turned_rad - heading_rad).abs() < 1e-9);
+        }
+    }
+}

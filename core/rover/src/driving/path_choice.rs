@@ -1,0 +1,85 @@
+//! The decision of a navigator: every path that it considered, why the vetoed ones failed, and the chosen one.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::motion::Motion;
+use crate::hazards::goodness::HazardTerm;
+
+/// Terms of a path's vote, 0 (worst) to 1 each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct PathTerms {
+    /// Goodness of the ground under the path.
+    pub hazard: f64,
+    /// Agreement of the heading at its end with the route to the goal.
+    pub goal: f64,
+    /// Agreement of its curvature with that of the motion before.
+    pub steer: f64,
+}
+
+/// Why a path must not be driven: its first failing cell.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Veto {
+    /// Centre of the cell, x and y of the site frame, m.
+    pub in_site_m: [f64; 2],
+    /// Distance of the rover's origin along the path at which the footprint meets the cell, m; of a turn 0.
+    pub along_m: f64,
+    /// The failing term.
+    pub term: HazardTerm,
+    /// Its value: deg, m, m; of `unknown` the share of unknown cells under the path.
+    pub value: f64,
+    /// The limit that it exceeds, in the same unit.
+    pub limit: f64,
+}
+
+/// A path that was considered.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Candidate {
+    /// The motion, as it would be driven.
+    pub motion: Motion,
+    /// Length over which the hazard was evaluated, m.
+    pub evaluated_m: f64,
+    /// The terms of its vote.
+    pub terms: PathTerms,
+    /// Weighted sum of the terms.
+    pub vote: f64,
+    /// Share of unknown cells under the driven part, 0 to 1.
+    pub unknown_share: f64,
+    /// Why it must not be driven; null for a path that may be.
+    pub veto: Option<Veto>,
+}
+
+/// The decision at a stop.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct PathChoice {
+    /// Every path that was considered.
+    pub candidates: Vec<Candidate>,
+    /// Index of the chosen one; null if no path is safe.
+    pub chosen: Option<usize>,
+    /// Route to the goal over the map, x and y of the site frame, m; empty without a map.
+    pub route_m: Vec<[f64; 2]>,
+}
+
+impl Candidate {
+    /// A path of which no hazard is known.
+    pub(super) fn unjudged(motion: Motion) -> Self {
+        let evaluated_m = match motion {
+            Motion::Arc { length_m, .. } => length_m.abs(),
+            Motion::Turn { .. } => 0.0,
+        };
+        let terms = PathTerms { hazard: 1.0, goal: 1.0, steer: 1.0 };
+        Self { motion, evaluated_m, terms, vote: 1.0, unknown_share: 0.0, veto: None }
+    }
+}
+
+impl PathChoice {
+    /// The choice among one path.
+    pub(crate) fn only(candidate: Candidate) -> Self {
+        Self { candidates: vec![candidate], chosen: Some(0), route_m: Vec::new() }
+    }
+
+    /// The chosen motion; `None` if no path is safe.
+    pub fn motion(&self) -> Option<Motion> {
+        Some(self.candidates.get(self.chosen?)?.motion)
+    }
+}

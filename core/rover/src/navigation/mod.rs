@@ -1,0 +1,29 @@
+//! Stage 9, `select_path`, on a goodness map: the navigator that drives round hazards, and why it did not take a path.
+//!
+//! ```text
+//! goodness map ─► ground (bad cells, clearance) ─► route to the goal ─► paths: veto, votes ─► choice ─► counterfactual
+//! ```
+//! | file | content |
+//! |---|---|
+//! | `settings` | settings and the presets `gestalt` and `morphin` |
+//! | `limits`, `ground` | limits of the terms, bad cells, clearance |
+//! | `route` | goal layer: least cost to the goal |
+//! | `path` | footprint along a path, its veto and its hazard |
+//! | `navigator` | candidates, votes, choice |
+//! | `counterfactual` | smallest change of a limit that opens paths |
+//!
+//! Frame: site, horizontal. Source: domain.md 8.
+
+pub mod settings;
+mod limits;
+mod ground;
+mod route;
+mod path;
+pub mod navigator;
+pub mod counterfactual;
+#[cfg(test)]
+mod tests;
+
+pub use counterfactual::{LimitChange, counterfactual};
+pub use navigator::HazardNavigator;
+pub use settings::{NavigatorPreset, NavigatorSettings};

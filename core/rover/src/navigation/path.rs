@@ -1,0 +1,235 @@
+//! A path over the ground: samples of its footprint, its veto and its hazard.
+//!
+//! The rover is covered by two discs of its radius, one at its origin and a leading one `reach_m` ahead of it, or behind when it
+//! backs up; a turn has one on either side. The goodness of a cell is that of the disc around it, so that each disc is one cell.
+//!
+//! ```text
+//! veto    if a term of a sample exceeds its limit, or more than `unknown_share_max` of the samples are unknown   (driven part)
+//! hazard  = ω min q + (1 − ω) Σ q c/(1 + s) / Σ 1/(1 + s)                                                 (evaluated part)
+//! c       = certainty · ½^(age/age_half_life_m)
+//! ```
+//! | symbol | name | unit |
+//! |---|---|---|
+//! | s | distance along the path | m |
+//! | q | quality of the cell, `ground.rs` | – |
+//! | ω | `worst_weight`: ½ for GESTALT, 0 for Morphin | – |
+//!
+//! A rover that stands on bad cells may leave them: within `escape_m` a disc that was bad at the start may remain so as long as
+//! it gets no deeper into them.
+//!
+//! Frame: site, horizontal. Source: domain.md 8.2.
+
+use crate::driving::motion::Motion;
+use crate::driving::path_choice::Veto;
+use crate::hazards::goodness::{CellBasis, HazardTerm};
+use sightline_geometry::frames::Pose;
+
+use super::ground::{Ground, Spot};
+use super::settings::NavigatorSettings;
+
+/// Angle of two samples of a turn, rad.
+const TURN_SAMPLE_RAD: f64 = 10.0 * std::f64::consts::PI / 180.0;
+
+/// Position and heading of the rover in the level.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Stance {
+    /// x and y of the site frame, m.
+    pub(super) at_m: [f64; 2],
+    /// Positive to the right of the site's +x, rad.
+    pub(super) heading_rad: f64,
+}
+
+impl Stance {
+    pub(super) fn of(site_from_rover: &Pose) -> Self {
+        let origin = site_from_rover.translation.vector;
+        Self { at_m: [origin.x, origin.y], heading_rad: site_from_rover.rotation.euler_angles().2 }
+    }
+
+    /// A position ahead and to the right of the rover in the site frame, m.
+    pub(super) fn place(&self, [ahead, right]: [f64; 2]) -> [f64; 2] {
+        let (sine, cosine) = self.heading_rad.sin_cos();
+        [self.at_m[0] + cosine * ahead - sine * right, self.at_m[1] + sine * ahead + cosine * right]
+    }
+
+    /// A position of the site frame ahead and to the right of the rover, m.
+    pub(super) fn seen(&self, at_m: [f64; 2]) -> [f64; 2] {
+        let (sine, cosine) = self.heading_rad.sin_cos();
+        let (dx, dy) = (at_m[0] - self.at_m[0], at_m[1] - self.at_m[1]);
+        [cosine * dx + sine * dy, cosine * dy - sine * dx]
+    }
+
+    /// The stance after a part of a motion.
+    pub(super) fn after(&self, motion: &Motion, part: f64) -> Self {
+        let (moved, turned_rad) = motion.after(part);
+        Self { at_m: self.place(moved), heading_rad: self.heading_rad + turned_rad }
+    }
+}
+
+/// A disc of the footprint at one place of a path.
+#[derive(Clone, Copy, Debug)]
+struct Sample {
+    /// Number of the disc: the first is that at the rover's origin.
+    disc: usize,
+    along_m: f64,
+    is_driven: bool,
+    at_m: [f64; 2],
+    spot: Spot,
+}
+
+/// A path over the ground.
+pub(super) struct Path<'a> {
+    settings: &'a NavigatorSettings,
+    limits: super::limits::VetoLimits,
+    ground: &'a Ground<'a>,
+    /// In the order of the distance.
+    samples: Vec<Sample>,
+    /// Clearance of each disc before the motion.
+    start_m: [f64; 3],
+    is_turn: bool,
+    /// Length over which the hazard is evaluated, m; 0 of a turn.
+    pub(super) evaluated_m: f64,
+}
+
+impl<'a> Path<'a> {
+    /// The path of a motion, evaluated over at least `evaluated_min_m` of an arc.
+    pub(super) fn new(
+        ground: &'a Ground<'a>,
+        start: &Stance,
+        motion: &Motion,
+        evaluated_min_m: f64,
+        settings: &'a NavigatorSettings,
+    ) -> Self {
+        let offsets = offsets(motion, settings.reach_m);
+        let discs = |stance: Stance| offsets.iter().map(move |ahead| stance.place([*ahead, 0.0])).enumerate();
+        let mut start_m = [f64::INFINITY; 3];
+        for (disc, at_m) in discs(*start) {
+            start_m[disc] = ground.spot(at_m).clearance_m;
+        }
+        let (parts, evaluated_m) = parts(motion, evaluated_min_m, settings);
+        let length_m = match motion {
+            Motion::Arc { length_m, .. } => length_m.abs(),
+            Motion::Turn { .. } => 0.0,
+        };
+        let samples = parts
+            .into_iter()
+            .flat_map(|part| {
+                let (along_m, is_driven) = (part * length_m, part <= 1.0);
+                discs(start.after(motion, part)).map(move |(disc, at_m)| Sample {
+                    disc,
+                    along_m,
+                    is_driven,
+                    at_m,
+                    spot: ground.spot(at_m),
+                })
+            })
+            .collect();
+        let is_turn = matches!(motion, Motion::Turn { .. });
+        Self { settings, limits: ground.limits, ground, samples, start_m, is_turn, evaluated_m }
+    }
+
+    fn driven(&self) -> impl Iterator<Item = &Sample> {
+        self.samples.iter().filter(|sample| sample.is_driven)
+    }
+
+    /// Bad samples of the driven part that the rover may not pass, in the order of the distance.
+    fn failing(&self) -> impl Iterator<Item = &Sample> {
+        let mut may_remain = self.start_m.map(|clearance_m| clearance_m < 0.0);
+        self.driven().filter(move |sample| {
+            let is_near = self.is_turn || sample.along_m <= self.settings.escape_m;
+            let is_no_deeper = sample.spot.clearance_m >= self.start_m[sample.disc];
+            let may_remain = &mut may_remain[sample.disc];
+            *may_remain &= sample.spot.is_bad() && is_near && is_no_deeper;
+            sample.spot.is_bad() && !*may_remain
+        })
+    }
+
+    /// Share of unknown samples of the driven part, 0 to 1.
+    pub(super) fn unknown_share(&self) -> f64 {
+        let count = self.driven().count().max(1);
+        let unknown = self.driven().filter(|sample| sample.spot.cell.basis == CellBasis::Unknown).count();
+        unknown as f64 / count as f64
+    }
+
+    /// The first failing cell; `None` for a path that may be driven.
+    pub(super) fn veto(&self) -> Option<Veto> {
+        let measured = self.failing().find_map(|sample| {
+            let term = self.limits.exceeded(&sample.spot.cell)?;
+            Some((sample, term, sample.spot.cell.value(term)))
+        });
+        let unknown_share = self.unknown_share();
+        let (sample, term, value) = measured.or_else(|| {
+            let is_unknown = |sample: &&Sample| sample.spot.cell.basis == CellBasis::Unknown;
+            let first =
+                self.driven().find(is_unknown).filter(|_| unknown_share > self.limits.unknown_share)?;
+            Some((first, HazardTerm::Unknown, unknown_share))
+        })?;
+        // A sample outside the window has no cell.
+        let in_site_m = sample.spot.index.map_or(sample.at_m, |index| self.ground.map.grid.centre_m(index));
+        Some(Veto { in_site_m, along_m: sample.along_m, term, value, limit: self.limits.of(term) })
+    }
+
+    /// The largest value of a term among the failing cells; the share of unknown samples for `unknown`.
+    pub(super) fn largest(&self, term: HazardTerm) -> f64 {
+        match term {
+            HazardTerm::Unknown => self.unknown_share(),
+            _ => self.failing().map(|sample| sample.spot.cell.value(term)).fold(0.0, f64::max),
+        }
+    }
+
+    /// The hazard term, 0 (worst) to 1.
+    pub(super) fn hazard(&self) -> f64 {
+        let (mut worst, mut sum, mut weights) = (f64::INFINITY, 0.0, 0.0);
+        for sample in self.samples.iter().filter(|sample| sample.disc == 0 || self.is_turn) {
+            let weight = 1.0 / (1.0 + sample.along_m);
+            weights += weight;
+            if sample.spot.cell.basis != CellBasis::Unknown {
+                let quality = sample.spot.quality(self.settings);
+                worst = worst.min(quality);
+                sum += weight * quality * self.certainty(&sample.spot);
+            }
+        }
+        if !worst.is_finite() {
+            return 0.0;
+        }
+        let worst_weight = self.settings.worst_weight;
+        worst_weight * worst + (1.0 - worst_weight) * sum / weights
+    }
+
+    /// Certainty of a cell, discounted by the age of its observations; of assumed and exempt cells at least the least one.
+    fn certainty(&self, spot: &Spot) -> f64 {
+        let certainty = f64::from(spot.cell.certainty);
+        let half_life_m = self.settings.age_half_life_m;
+        let age = if half_life_m > 0.0 { f64::from(spot.cell.age_m).max(0.0) / half_life_m } else { 0.0 };
+        let discounted = certainty * 0.5_f64.powf(age);
+        match spot.cell.basis {
+            CellBasis::Measured | CellBasis::Unknown => discounted,
+            CellBasis::Assumed | CellBasis::Exempt => discounted.max(self.ground.map.settings.certainty_min),
+        }
+    }
+}
+
+/// Distances of the discs ahead of the rover's origin, m.
+fn offsets(motion: &Motion, reach_m: f64) -> Vec<f64> {
+    match *motion {
+        Motion::Turn { .. } => vec![0.0, reach_m, -reach_m],
+        Motion::Arc { length_m, .. } => vec![0.0, reach_m.copysign(length_m)],
+    }
+}
+
+/// Parts of a motion at which it is sampled, beyond 1 where more than the driven part is evaluated, and the evaluated length, m.
+fn parts(motion: &Motion, evaluated_min_m: f64, settings: &NavigatorSettings) -> (Vec<f64>, f64) {
+    let length_m = match *motion {
+        Motion::Turn { angle_rad } => {
+            let count = (angle_rad.abs() / TURN_SAMPLE_RAD).ceil().max(1.0);
+            return ((1..=count as usize).map(|k| k as f64 / count).collect(), 0.0);
+        }
+        Motion::Arc { length_m, .. } => length_m.abs(),
+    };
+    let driven_m = length_m.max(1e-6);
+    let count = |length_m: f64| (length_m / settings.sample_m - 1e-9).ceil().max(0.0) as usize;
+    let (driven, beyond_m) = (count(driven_m).max(1), (evaluated_min_m - driven_m).max(0.0));
+    let beyond = count(beyond_m);
+    let mut parts: Vec<f64> = (1..=driven).map(|k| k as f64 / driven as f64).collect();
+    parts.extend((1..=beyond).map(|k| 1.0 + beyond_m / driven_m * k as f64 / beyond as f64));
+    (parts, driven_m + beyond_m)
+}
