@@ -23,6 +23,8 @@ pub mod navigator;
 pub mod counterfactual;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod drive_tests;
 
 pub use counterfactual::{LimitChange, counterfactual};
 pub use navigator::HazardNavigator;
