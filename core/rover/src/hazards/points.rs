@@ -16,7 +16,7 @@ use super::settings::HazardSettings;
 use crate::visual_odometry::reduce::Reduced;
 use crate::visual_odometry::windows::Eye;
 
-/// The points that a stereo pair shows, rover frame, m, row by row of the left image.
+/// The points that a stereo pair shows, rover frame, m, row by row of the left image, without those of the rover itself.
 ///
 /// # Errors
 /// As [`dense_stereo_until`].
@@ -41,5 +41,8 @@ pub fn range_points(
         dense_stereo_until([&left.image, &right.image], [&left.camera, &right.camera], &stereo, cancel)?
     };
     let found = dense.points_m.iter().filter(|point| point[0].is_finite());
-    Ok(found.map(|point| Point3::from(point.map(f64::from))).collect())
+    let is_own = |point: &Point3| {
+        point.x.abs() < settings.own_half_length_m && point.y.abs() < settings.own_half_width_m
+    };
+    Ok(found.map(|point| Point3::from(point.map(f64::from))).filter(|point| !is_own(point)).collect())
 }

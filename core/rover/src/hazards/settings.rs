@@ -6,7 +6,7 @@
 use sightline_geometry::error::{Error, Result};
 use sightline_track::limits::Domain;
 use sightline_track::settings_group;
-use sightline_vision::stereo::StereoSettings;
+use sightline_vision::stereo::{StereoMethod, StereoSettings};
 
 settings_group! {
     /// Settings of the hazard map.
@@ -43,6 +43,16 @@ settings_group! {
         range_min_m: f64 = 0.4, "m", Domain::Between(0.1, 10.0), "ours";
         /// Points farther from the left camera are left out: their error is larger than the terms.
         range_max_m: f64 = 10.0, "m", Domain::Between(1.0, 100.0), "ours";
+        /// Least slope of the image for a match, fraction of full scale per px. Too low: points in the sky; too high: holes.
+        range_texture_min: f64 = 0.003, "1/px", Domain::Between(0.0, 0.1), "ours; docs/driving.md";
+        /// Share by which the best match must be better than any other.
+        range_uniqueness_min: f64 = 0.15, "", Domain::Between(0.0, 1.0), "ours; docs/driving.md";
+        /// Patches of fewer pixels are left out (blob filter).
+        range_speckle_px: u32 = 250, "px", Domain::Between(0.0, 100_000.0), "ours; domain.md 7: JPL 4 % of the image";
+        /// Points nearer to the rover's axis along its length and …
+        own_half_length_m: f64 = 0.95, "m", Domain::Between(0.0, 3.0), "domain.md 5.4";
+        /// … across its width are left out: they are its own wheels and panels.
+        own_half_width_m: f64 = 1.2, "m", Domain::Between(0.0, 3.0), "domain.md 5.4";
         /// Points higher above the rover's origin are left out: it passes below them, or they are false matches.
         height_max_m: f64 = 2.0, "m", Domain::Between(0.2, 20.0), "ours";
         /// Images wider than this are reduced before stereo.
@@ -93,9 +103,13 @@ impl HazardSettings {
     /// Settings of dense stereo for the points of the map.
     pub(super) fn stereo(&self) -> StereoSettings {
         StereoSettings {
+            // Semi-global matching carries disparities of the ground into the sky.
+            method: StereoMethod::BlockMatching,
             range_min_m: self.range_min_m,
             range_max_m: self.range_max_m,
-            speckle_px: 64,
+            texture_min: self.range_texture_min,
+            uniqueness_min: self.range_uniqueness_min,
+            speckle_px: self.range_speckle_px,
             ..StereoSettings::default()
         }
     }
