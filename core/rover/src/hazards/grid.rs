@@ -27,17 +27,12 @@ impl Grid {
     }
 
     /// Number of cells.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.side * self.side
     }
 
-    /// Whether it has no cells.
-    pub fn is_empty(&self) -> bool {
-        self.side == 0
-    }
-
     /// Row and column of the cell at a position, site frame, m; `None` outside.
-    pub fn cell_at(&self, at_m: [f64; 2]) -> Option<[usize; 2]> {
+    pub(super) fn cell_at(&self, at_m: [f64; 2]) -> Option<[usize; 2]> {
         let within = |axis: usize| {
             let number = (at_m[axis] / self.cell_m).floor() - self.first[axis] as f64;
             (number >= 0.0 && number < self.side as f64).then_some(number as usize)
@@ -46,17 +41,17 @@ impl Grid {
     }
 
     /// Index of the cell at a position, site frame, m; `None` outside.
-    pub fn index_at(&self, at_m: [f64; 2]) -> Option<usize> {
+    pub(crate) fn index_at(&self, at_m: [f64; 2]) -> Option<usize> {
         self.cell_at(at_m).map(|[row, column]| row * self.side + column)
     }
 
     /// Centre of a cell, site frame, m.
-    pub fn centre_m(&self, index: usize) -> [f64; 2] {
+    pub(crate) fn centre_m(&self, index: usize) -> [f64; 2] {
         let cell = [index / self.side, index % self.side];
         [0, 1].map(|axis| ((self.first[axis] + cell[axis] as i64) as f64 + 0.5) * self.cell_m)
     }
 
-    /// Where the content of a cell is stored, and whether it stays there when the window moves to `other`.
+    /// Where the content of a cell is stored, in every window of as many cells.
     pub(super) fn slot(&self, row: usize, column: usize) -> usize {
         let side = self.side as i64;
         let at = |axis: usize, number: usize| (self.first[axis] + number as i64).rem_euclid(side) as usize;

@@ -63,11 +63,6 @@ pub fn map_hazards(before: Option<&HazardMap>, scan: &Scan<'_>, settings: &Hazar
 }
 
 impl HazardMap {
-    /// The window of cells.
-    pub fn grid(&self) -> &Grid {
-        &self.grid
-    }
-
     /// The sums of a cell.
     #[inline]
     pub(super) fn cell(&self, row: usize, column: usize) -> &Moments {

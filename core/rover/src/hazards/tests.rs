@@ -95,7 +95,7 @@ fn sums_and_steps_are_those_of_a_visit_of_every_cell() {
         .collect();
     let map = mapped(None, &scattered, &pose(0.04, -0.02), 0.0, &settings);
     let assessed = assess(&map, &MapRules::default(), &settings);
-    let grid = map.grid();
+    let grid = &map.grid;
     let side = grid.side as i64;
     for index in (0..grid.len()).step_by(7) {
         let [row, column] = [index as i64 / side, index as i64 % side];
@@ -153,7 +153,7 @@ fn points_decay_by_half_in_their_half_life() {
     let seen = points([0.0, 0.0], 0.5, 0.05, |_, _| 0.0);
     let first = mapped(None, &seen, &pose(0.0, 0.0), 0.0, &settings);
     let count = |map: &HazardMap| {
-        let side = map.grid().side;
+        let side = map.grid.side;
         (0..side * side).map(|index| map.cell(index / side, index % side).count()).sum::<f64>()
     };
     let later = mapped(Some(&first), &[], &pose(2.0, 0.0), 5.0, &settings);
