@@ -8,9 +8,10 @@ use std::path::Path;
 use std::sync::{Arc, Mutex};
 
 use sightline_api::event::Event;
+use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_recordings::DrivenTraverse;
-use sightline_rover::driving::{ArcNavigator, DriveCommand, OdometryPair, executive, odometry};
+use sightline_rover::driving::{DriveCommand, HazardMaps, OdometryPair, executive, odometry};
 use sightline_rover::pipeline::Stops;
 use sightline_session::driving::{self, DriveView, Steering};
 use sightline_session::step::RunStep;
@@ -33,6 +34,8 @@ pub(crate) type OpenTraverses = Arc<Mutex<Vec<Arc<OpenTraverse>>>>;
 /// The world of a drive on commands.
 pub(crate) struct Driven {
     world: Mutex<DrivenTraverse>,
+    /// Hazard maps of the stops; locked before `world`, never while it is held.
+    maps: Mutex<HazardMaps>,
     cache: Arc<Cache>,
 }
 
@@ -72,7 +75,8 @@ pub(crate) fn open(
 ) -> Result<OpenTraverse> {
     let traverse = world.snapshot()?.with_cache(cache);
     let name = traverse.folder().file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let driven = Arc::new(Driven { world: Mutex::new(world), cache: Arc::clone(cache) });
+    let driven =
+        Arc::new(Driven { world: Mutex::new(world), maps: Mutex::default(), cache: Arc::clone(cache) });
     Ok(OpenTraverse::new(Identity::driven(name), traverse, events.clone()).driven_in(driven))
 }
 
@@ -134,19 +138,25 @@ pub(crate) fn drive_on(
         let problem = "this drive was planned or recorded before; it is replayed and cannot be driven on";
         return Err(Error::Request(problem.to_owned()));
     };
-    let mut world = lock(&driven.world);
     let (Some(first), Some(last)) = (steps.first(), steps.last()) else { return Ok(None) };
+    let (command, navigator) = (&steering.command, &*steering.command.navigator.navigator());
+    let mut maps = lock(&driven.maps);
+    // Images may have to be rendered: the world is free meanwhile.
+    map_hazards(open, command, steps, &mut maps, cancel.as_ref().into())?;
+    let mut world = lock(&driven.world);
     if world.traverse().stop_count() != last.step + 1 {
         return Ok(None);
     }
-    let before = driving::cycles(&world, &steering.command, &steps[..steps.len() - 1]);
-    let navigator = &ArcNavigator::default();
+    let before = driving::cycles(&world, command, &steps[..steps.len() - 1], &mut maps);
+    let hazards = maps.at(world.traverse(), command, [&first.trace, &last.trace], cancel.as_ref().into())?;
+    drop(maps);
     let input = executive::CycleInput {
-        command: &steering.command,
+        command,
         navigator,
         first: &first.trace,
         last: &last.trace,
         before: before.last(),
+        hazards: hazards.as_deref(),
     };
     let state = world.state().to_vec();
     let before = steering.halt_within(last.step + 1);
@@ -165,6 +175,23 @@ pub(crate) fn drive_on(
     let traverse = world.snapshot()?.with_cache(&driven.cache);
     drop(world);
     Ok(Some(Arc::new(open.grown(traverse))))
+}
+
+/// Computes the hazard maps of a run's stops that are missing, without the world.
+///
+/// # Errors
+/// [`Error::Cancelled`].
+fn map_hazards(
+    open: &OpenTraverse,
+    command: &DriveCommand,
+    steps: &[Arc<RunStep>],
+    maps: &mut HazardMaps,
+    cancel: Cancel<'_>,
+) -> Result<()> {
+    let Some(first) = steps.first() else { return Ok(()) };
+    steps
+        .iter()
+        .try_for_each(|step| maps.at(&open.traverse, command, [&first.trace, &step.trace], cancel).map(drop))
 }
 
 /// Points the mast at the last stop and lets its images be taken, as far as no pause is before; returns the drive as it is then.
@@ -247,7 +274,10 @@ pub(crate) fn view(live: &LiveSession) -> DriveView {
     let run = live.with(|session| session.run(steering.target, steering.run).cloned());
     let Ok(run) = run else { return DriveView { steering: Some(steering.clone()), ..DriveView::default() } };
     let is_driving = live.is_computing(steering.target, steering.run);
-    driven.with(|world| DriveView::of(world, steering, &run, is_driving))
+    let mut maps = lock(&driven.maps);
+    // Never cancelled.
+    let _mapped = map_hazards(&open, &steering.command, run.whole_steps(), &mut maps, Cancel::default());
+    driven.with(|world| DriveView::of(world, steering, &run, &mut maps, is_driving))
 }
 
 /// Puts the drive with a stop more in the place of the former one in the list of open drives.

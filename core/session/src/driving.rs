@@ -17,8 +17,9 @@ use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Vector3;
 use sightline_recordings::{DrivenTraverse, Traverse};
 use sightline_rover::driving::executive::{self, CycleInput};
+use sightline_rover::driving::map_hazards::hazard_camera;
 use sightline_rover::driving::set_goal::goal_position_m;
-use sightline_rover::driving::{ArcNavigator, Cycle, DriveCommand, Ending, StopReason};
+use sightline_rover::driving::{Cycle, DriveCommand, Ending, HazardMaps, StopReason};
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
 use sightline_track::trace::StepTrace;
@@ -62,8 +63,14 @@ pub struct DriveView {
 
 impl DriveView {
     /// The drive of a run: its decisions and outcome up to the pause.
-    pub fn of(world: &DrivenTraverse, steering: &Steering, run: &Run, is_driving: bool) -> Self {
-        let mut cycles = cycles(world, &steering.command, run.whole_steps());
+    pub fn of(
+        world: &DrivenTraverse,
+        steering: &Steering,
+        run: &Run,
+        maps: &mut HazardMaps,
+        is_driving: bool,
+    ) -> Self {
+        let mut cycles = cycles(world, &steering.command, run.whole_steps(), maps);
         steering.up_to_halt(&mut cycles);
         let summary = summary(world, &steering.command, run.whole_steps(), &cycles);
         let goes_on = !is_driving && summary.reason.is_none() && run.why_stopped().is_none();
@@ -83,6 +90,8 @@ pub struct TargetedDrive {
     pub steps: Vec<Arc<RunStep>>,
     /// The decisions at the stops of the steps, one fewer than there are steps until the drive has ended.
     pub cycles: Vec<Cycle>,
+    /// The hazard maps of the stops so far.
+    pub maps: HazardMaps,
 }
 
 /// The outcome of a drive.
@@ -131,12 +140,18 @@ impl TargetedDrive {
         }
         let first = track::designate_until(world.traverse(), designation, settings, cancel)?;
         check_command(world.traverse(), &command, &first.trace)?;
-        Ok(Self { world, command, steps: vec![Arc::new(first)], cycles: Vec::new() })
+        Ok(Self {
+            world,
+            command,
+            steps: vec![Arc::new(first)],
+            cycles: Vec::new(),
+            maps: HazardMaps::default(),
+        })
     }
 
     /// The end of the drive; `None` while it goes on.
     pub fn ending(&self) -> Option<Ending> {
-        self.cycles.last()?.ending
+        self.cycles.last()?.ending.clone()
     }
 
     /// Decides at the last stop and drives to the next, where the target is found; false once the drive has ended.
@@ -150,12 +165,15 @@ impl TargetedDrive {
         let (Some(first), Some(last)) = (self.steps.first().cloned(), self.steps.last().cloned()) else {
             return Ok(false);
         };
+        let hazards =
+            self.maps.at(self.world.traverse(), &self.command, [&first.trace, &last.trace], cancel)?;
         let input = CycleInput {
             command: &self.command,
-            navigator: &ArcNavigator::default(),
+            navigator: &*self.command.navigator.navigator(),
             first: &first.trace,
             last: &last.trace,
             before: self.cycles.last(),
+            hazards: hazards.as_deref(),
         };
         let before = self.world.state().to_vec();
         let (cycle, trace) = match executive::advance(&mut self.world, &input, settings, cancel) {
@@ -181,11 +199,12 @@ impl TargetedDrive {
 /// Refuses a command that makes no sense for a target where it was designated.
 ///
 /// # Errors
-/// [`Error::Setting`] as [`DriveCommand::validate_for`], for a goal outside the ground of a simulated world, and for a tilt limit
+/// [`Error::Setting`] as [`DriveCommand::validate_for`], for a navigator whose pair is missing, for a goal outside the ground of a simulated world, and for a tilt limit
 /// that the rover exceeds where it stands.
 pub(crate) fn check_command(traverse: &Traverse, command: &DriveCommand, first: &StepTrace) -> Result<()> {
     let target = &first.update.target;
     command.validate_for(&target.position_in_rover)?;
+    hazard_camera(traverse, first.step, command)?;
     let pose = traverse.site_from_rover(first.step);
     let tilt_deg = (pose.rotation * Vector3::z()).z.clamp(-1.0, 1.0).acos().to_degrees();
     if tilt_deg > command.tilt_max_deg {
@@ -212,13 +231,22 @@ pub(crate) fn check_command(traverse: &Traverse, command: &DriveCommand, first: 
 /// What a run decides at each of its stops under a command, and what the rover reported of the drives between them.
 ///
 /// For the run that drives these are the decisions that were followed; for another run they show where it would have gone.
-pub fn cycles(world: &DrivenTraverse, command: &DriveCommand, steps: &[Arc<RunStep>]) -> Vec<Cycle> {
+/// `maps` keeps the hazard maps for the next call; those that are missing are computed, and a missing image of their pair is rendered.
+pub fn cycles(
+    world: &DrivenTraverse,
+    command: &DriveCommand,
+    steps: &[Arc<RunStep>],
+    maps: &mut HazardMaps,
+) -> Vec<Cycle> {
     let mut cycles = Vec::<Cycle>::with_capacity(steps.len());
     let Some(first) = steps.first() else { return cycles };
+    let navigator = &*command.navigator.navigator();
     for step in steps {
         let before = cycles.last();
-        let navigator = &ArcNavigator::default();
-        let input = CycleInput { command, navigator, first: &first.trace, last: &step.trace, before };
+        let (first, last) = (&first.trace, &step.trace);
+        // Never cancelled.
+        let hazards = maps.at(world.traverse(), command, [first, last], Cancel::default()).ok().flatten();
+        let input = CycleInput { command, navigator, first, last, before, hazards: hazards.as_deref() };
         let mut cycle = executive::decide(world.traverse(), &input);
         if let Some(report) = world.report(step.step + 1).filter(|_| cycle.motion.is_some()) {
             cycle.add(report);
@@ -236,7 +264,7 @@ pub fn summary(
     cycles: &[Cycle],
 ) -> DriveSummary {
     let truth = steps.last().and_then(|step| step.truth.as_ref());
-    let ending = cycles.last().and_then(|cycle| cycle.ending);
+    let ending = cycles.last().and_then(|cycle| cycle.ending.as_ref());
     DriveSummary {
         stops: steps.len(),
         arrived: ending.is_some_and(|ending| ending.reason == StopReason::Arrived),

@@ -95,7 +95,7 @@ impl Steering {
         }
         match halt.before {
             CycleStage::SetGoal => drop(cycles.pop()),
-            CycleStage::SelectPath => (last.motion, last.ending) = (None, None),
+            CycleStage::SelectPath => (last.motion, last.choice, last.ending) = (None, None, None),
             _ => {}
         }
     }

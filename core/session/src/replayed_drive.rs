@@ -13,7 +13,7 @@ use sightline_geometry::error::Result;
 use sightline_recordings::Traverse;
 use sightline_recordings::replayed::{Answer, Replayed};
 use sightline_rover::driving::executive::{self, CycleInput};
-use sightline_rover::driving::{ArcNavigator, Cycle, DriveCommand, StopReason};
+use sightline_rover::driving::{Cycle, DriveCommand, HazardMaps, StopReason};
 use sightline_rover::visual_odometry::OdometryMode;
 use sightline_track::settings::Settings;
 use sightline_track::target::{Designation, TrackingState};
@@ -27,6 +27,7 @@ pub struct ReplayedDrive<'a> {
     pub steps: Vec<Arc<RunStep>>,
     /// The decisions at the stops of the steps.
     pub cycles: Vec<Cycle>,
+    maps: HazardMaps,
 }
 
 /// How a recording compares with the commands of the loop.
@@ -63,7 +64,8 @@ impl<'a> ReplayedDrive<'a> {
         let first = track::designate_until(traverse, designation, settings, cancel)?;
         check_command(traverse, &command, &first.trace)?;
         let world = Replayed::new(traverse, first.step);
-        Ok(Self { traverse, world, command, steps: vec![Arc::new(first)], cycles: Vec::new() })
+        let steps = vec![Arc::new(first)];
+        Ok(Self { traverse, world, command, steps, cycles: Vec::new(), maps: HazardMaps::default() })
     }
 
     /// Decides at the last stop and tracks at the next; false once the drive has ended or the recording ends.
@@ -77,12 +79,14 @@ impl<'a> ReplayedDrive<'a> {
         if self.cycles.len() == self.steps.len() {
             return Ok(false);
         }
+        let hazards = self.maps.at(self.traverse, &self.command, [&first.trace, &last.trace], cancel)?;
         let input = CycleInput {
             command: &self.command,
-            navigator: &ArcNavigator::default(),
+            navigator: &*self.command.navigator.navigator(),
             first: &first.trace,
             last: &last.trace,
             before: self.cycles.last(),
+            hazards: hazards.as_deref(),
         };
         if !self.world.goes_on() {
             self.cycles.push(executive::decide(self.traverse, &input));
@@ -108,7 +112,7 @@ impl<'a> ReplayedDrive<'a> {
         let median_m = apart_m.get(apart_m.len() / 2);
         ReplaySummary {
             stops: self.steps.len(),
-            reason: self.cycles.last().and_then(|cycle| cycle.ending).map(|ending| ending.reason),
+            reason: self.cycles.last().and_then(|cycle| cycle.ending.as_ref()).map(|ending| ending.reason),
             apart_m: median_m.zip(apart_m.last()).map(|(median_m, max_m)| [*median_m, *max_m]),
             mast_apart_deg: answers.iter().filter_map(|answer| answer.mast_apart_deg).reduce(f64::max),
             holds_target: self

@@ -128,6 +128,7 @@ fn without_the_comparison_with_the_truth_a_drive_has_the_same_bits() {
             first: &steps[0],
             last: &steps[steps.len() - 1],
             before: cycles.last(),
+            hazards: None,
         };
         let (cycle, step) = executive::advance(&mut world, &input, &settings, Cancel::default()).unwrap();
         cycles.push(cycle);

@@ -12,6 +12,7 @@ mod trackability;
 mod records;
 mod rendering;
 mod driving;
+mod driving_hazards;
 mod driving_odometry;
 mod terrain_odometry;
 mod stage_pause;

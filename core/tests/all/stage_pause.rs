@@ -87,6 +87,7 @@ fn a_world_paused_before_any_stage_goes_on_with_the_same_state_and_images() {
         first: &first.trace,
         last: &last.trace,
         before: drive.cycles.first(),
+        hazards: None,
     };
     let file = folder.path().join("drive").join(&drive.world.traverse().index().stops[2].left.image);
     for put_off in [Some(CycleStage::PointMast), Some(CycleStage::Capture), None] {

@@ -12,6 +12,7 @@ use sightline_geometry::error::{Error, Result};
 /// A scenario's name and its TOML.
 const FILES: &[(&str, &str)] = &[
     ("approach-10", include_str!("library/approach-10.toml")),
+    ("obstacles-10", include_str!("library/obstacles-10.toml")),
     ("approach-5", include_str!("library/approach-5.toml")),
     ("sideways-70", include_str!("library/sideways-70.toml")),
     ("turn-in-place", include_str!("library/turn-in-place.toml")),

@@ -10,6 +10,7 @@ use sightline_geometry::error::{Error, Result};
 use sightline_rover::driving::{DriveCommand, GoalRule};
 
 use super::worlds::Worlds;
+use sightline_server::cli::drive::NavigatorName;
 use sightline_server::cli::open;
 use sightline_server::cli::terminal::{self, Progress};
 
@@ -33,6 +34,9 @@ pub(super) struct Driving {
     /// Leave the rocks on the rover's way; without it, none above 10 cm is there.
     #[arg(long)]
     obstacles: bool,
+    /// The navigator that chooses the motions.
+    #[arg(long, value_name = "NAME", default_value = "arcs")]
+    navigator: NavigatorName,
     /// Leave out the drives with a fixed goal.
     #[arg(long)]
     only_following: bool,
@@ -84,6 +88,7 @@ impl Driving {
                 standoff_m: self.standoff,
                 tolerance_m: self.tolerance,
                 goal,
+                navigator: self.navigator.kind(),
                 ..DriveCommand::default()
             };
             let study = Drives {

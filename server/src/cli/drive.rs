@@ -15,7 +15,9 @@ use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pixel;
 use sightline_recordings::replayed::Answer;
 use sightline_recordings::{DrivenTraverse, Traverse};
-use sightline_rover::driving::{ArrivalAction, Cycle, DriveCommand, GoalRule, OdometryPair, TrackedStops};
+use sightline_rover::driving::{
+    ArrivalAction, Cycle, DriveCommand, GoalRule, NavigatorKind, OdometryPair, PathChoice, TrackedStops,
+};
 use sightline_rover::visual_odometry::OdometryMode;
 use sightline_session::driving::{DriveSummary, TargetedDrive};
 use sightline_session::replayed_drive::{ReplaySummary, ReplayedDrive};
@@ -78,6 +80,16 @@ pub(super) struct Drive {
     /// The settings of visual odometry.
     #[arg(long, value_name = "NAME", default_value = "sightline")]
     odometry_preset: Configuration,
+    /// The navigator that chooses the motions.
+    #[arg(long, value_name = "NAME", default_value = "arcs")]
+    navigator: NavigatorName,
+    /// The pair of every stop that gives the hazard map, by its name in camera.further; by default the first hazcams that look
+    /// ahead.
+    #[arg(long, value_name = "NAME")]
+    hazard_camera: Option<CameraName>,
+    /// Ground nearer to the target counts as good on the hazard map, m.
+    #[arg(long, value_name = "M", default_value_t = DriveCommand::default().exemption_radius_m)]
+    exemption: f64,
     /// Slip ratio of a step above which the drive stops.
     #[arg(long, value_name = "PART", default_value_t = DriveCommand::default().slip_max)]
     slip_max: f64,
@@ -131,6 +143,17 @@ enum Pairs {
     Own,
 }
 
+/// The navigator that chooses the motions.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum NavigatorName {
+    /// The arc or turn to the goal, without a hazard map.
+    Arcs,
+    /// Avoids hazards: votes of hazard, goal and steering.
+    Gestalt,
+    /// Avoids hazards: goodness and certainty integrated under the path.
+    Morphin,
+}
+
 /// The stops at which the target is tracked.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Tracked {
@@ -150,6 +173,17 @@ impl Odometry {
     }
 }
 
+impl NavigatorName {
+    /// The navigator of a command.
+    pub const fn kind(self) -> NavigatorKind {
+        match self {
+            Self::Arcs => NavigatorKind::Arcs,
+            Self::Gestalt => NavigatorKind::Gestalt,
+            Self::Morphin => NavigatorKind::Morphin,
+        }
+    }
+}
+
 /// How the stops are written.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Format {
@@ -162,6 +196,9 @@ enum Format {
 struct StopLine<'a> {
     #[serde(flatten)]
     row: Row,
+    /// Number of paths that are vetoed; absent without a hazard map.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    vetoed_paths: Option<usize>,
     cycle: &'a Cycle,
 }
 
@@ -170,6 +207,9 @@ struct StopLine<'a> {
 struct ReplayLine<'a> {
     #[serde(flatten)]
     row: Row,
+    /// Number of paths that are vetoed; absent without a hazard map.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    vetoed_paths: Option<usize>,
     cycle: &'a Cycle,
     answer: Option<&'a Answer>,
 }
@@ -251,7 +291,12 @@ impl Drive {
             let goes_on = drive.advance(&settings, cancel)?;
             let number = drive.cycles.len() - 1;
             let (step, cycle): (&RunStep, &Cycle) = (&drive.steps[number], &drive.cycles[number]);
-            line(&ReplayLine { row: step.into(), cycle, answer: drive.answer_to(cycle) })?;
+            line(&ReplayLine {
+                row: step.into(),
+                vetoed_paths: vetoed_paths(cycle),
+                cycle,
+                answer: drive.answer_to(cycle),
+            })?;
             progress.tell(number + 1, traverse.stop_count());
             if !goes_on {
                 return line(&ReplaySummaryLine { summary: drive.summary() });
@@ -278,6 +323,9 @@ impl Drive {
                 Pairs::Own => OdometryPair::Own,
             },
             odometry_preset: self.odometry_preset.preset().1,
+            navigator: self.navigator.kind(),
+            hazard_camera: self.hazard_camera,
+            exemption_radius_m: self.exemption,
             slip_max: self.slip_max,
             on_arrival: self.on_arrival.iter().map(|OnArrival::Look| ArrivalAction::Look).collect(),
             ..DriveCommand::default()
@@ -300,8 +348,8 @@ fn follow(mut drive: TargetedDrive, settings: &Settings) -> Result<()> {
     loop {
         let goes_on = drive.advance(settings, Cancel::default())?;
         let number = drive.cycles.len() - 1;
-        let step: &RunStep = &drive.steps[number];
-        line(&StopLine { row: step.into(), cycle: &drive.cycles[number] })?;
+        let (step, cycle): (&RunStep, &Cycle) = (&drive.steps[number], &drive.cycles[number]);
+        line(&StopLine { row: step.into(), vetoed_paths: vetoed_paths(cycle), cycle })?;
         progress.tell(number + 1, drive.command.stops_max as usize);
         if !goes_on {
             return line(&SummaryLine { summary: drive.summary() });
@@ -309,6 +357,10 @@ fn follow(mut drive: TargetedDrive, settings: &Settings) -> Result<()> {
         // The images of stops that were left behind are not needed any more.
         drive.steps[number] = Arc::new(without_images(&drive.steps[number]));
     }
+}
+
+fn vetoed_paths(cycle: &Cycle) -> Option<usize> {
+    cycle.choice.as_ref().map(PathChoice::vetoed_count)
 }
 
 fn line(value: &impl Serialize) -> Result<()> {

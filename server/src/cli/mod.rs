@@ -9,7 +9,7 @@ mod simulate;
 mod import;
 mod info;
 mod track;
-mod drive;
+pub mod drive;
 mod presets;
 mod study;
 mod study_odometry;

@@ -36,6 +36,8 @@ pub(super) fn reason(reason: StopReason) -> &'static str {
         StopReason::Tilt => "tilted too much",
         StopReason::Time => "time on Mars used up",
         StopReason::StopLimit => "all stops used up",
+        StopReason::NoSafePath => "no safe path",
+        StopReason::NoRangeData => "no range data",
     }
 }
 
@@ -91,8 +93,16 @@ pub(super) fn ending(ending: &Ending) -> String {
         StopReason::Tilt => "°",
         StopReason::Time => " min",
         StopReason::StopLimit => " stops",
-        StopReason::Arrived | StopReason::Lost | StopReason::Stalled | StopReason::Slip => "",
+        StopReason::NoRangeData => " points",
+        StopReason::Arrived
+        | StopReason::Lost
+        | StopReason::Stalled
+        | StopReason::Slip
+        | StopReason::NoSafePath => "",
     };
+    if let Some(detail) = &ending.detail {
+        return format!("{}: {detail}", reason(ending.reason));
+    }
     match (ending.value, ending.limit) {
         (Some(value), Some(limit)) => {
             format!("{}: {}{unit}, limit {}", reason(ending.reason), digits(value), digits(limit))
@@ -141,8 +151,12 @@ mod tests {
         assert_eq!(arc(0.83, 0.05), "0.830 m ahead, radius 20 m right");
         assert_eq!(arc(-0.2, 0.0), "0.200 m back");
         assert_eq!(motion(&Motion::Turn { angle_rad: -0.5 }), "turn 28.65° left");
-        let arrived = Ending { reason: StopReason::Arrived, value: Some(0.008), limit: Some(0.01) };
+        let named = |reason, value, detail| Ending { reason, value, limit: value, detail };
+        let arrived = Ending { limit: Some(0.01), ..named(StopReason::Arrived, Some(0.008), None) };
         assert_eq!(ending(&arrived), "arrived: 0.8 cm from the goal by its own estimate, tolerance 1.0 cm");
-        assert_eq!(ending(&Ending { reason: StopReason::Lost, value: None, limit: None }), "target lost");
+        assert_eq!(ending(&named(StopReason::Lost, None, None)), "target lost");
+        let detail = "a tilt limit of 17.2° instead of 16.0° opens 4 paths".to_owned();
+        let blocked = ending(&named(StopReason::NoSafePath, None, Some(detail.clone())));
+        assert_eq!(blocked, format!("no safe path: {detail}"));
     }
 }

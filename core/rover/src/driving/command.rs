@@ -3,10 +3,13 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use sightline_geometry::camera::CameraName;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Point3;
 
 use super::odometry::OdometryPair;
+use super::select_path::{ArcNavigator, Navigator};
+use crate::navigation::{HazardNavigator, NavigatorPreset};
 use crate::visual_odometry::{OdometryMode, OdometryPreset};
 
 /// Whether tracking moves the goal.
@@ -30,6 +33,45 @@ pub enum TrackedStops {
     /// After each step of `step_fraction` of the distance and after each turn. If visual odometry needs shorter motions, it runs
     /// alone at the intermediate stops.
     ByDistance,
+}
+
+/// The navigator that chooses the motions.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum NavigatorKind {
+    /// The arc or turn to the goal, without a hazard map.
+    #[default]
+    Arcs,
+    /// Avoids the hazards of a goodness map: votes of hazard, goal and steering [R9].
+    Gestalt,
+    /// Avoids the hazards of a goodness map: goodness and certainty integrated under the path.
+    Morphin,
+}
+
+impl NavigatorKind {
+    /// The navigator, with the settings of its preset.
+    pub fn navigator(self) -> Box<dyn Navigator> {
+        let on_map = |preset: NavigatorPreset| HazardNavigator { settings: preset.settings() };
+        match self {
+            Self::Arcs => Box::new(ArcNavigator::default()),
+            Self::Gestalt => Box::new(on_map(NavigatorPreset::Gestalt)),
+            Self::Morphin => Box::new(on_map(NavigatorPreset::Morphin)),
+        }
+    }
+
+    /// Whether it needs a hazard map.
+    pub fn needs_map(self) -> bool {
+        self != Self::Arcs
+    }
+
+    /// Its name in a command.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Arcs => "arcs",
+            Self::Gestalt => "gestalt",
+            Self::Morphin => "morphin",
+        }
+    }
 }
 
 /// An action after arrival (R5).
@@ -67,6 +109,13 @@ pub struct DriveCommand {
     pub odometry_pair: OdometryPair,
     /// Its settings (`sightline`).
     pub odometry_preset: OdometryPreset,
+    /// The navigator (`arcs`).
+    pub navigator: NavigatorKind,
+    /// The pair of every stop whose images give the hazard map, by its name (null: the first pair on the body that looks ahead).
+    /// With `arcs` it has no effect.
+    pub hazard_camera: Option<CameraName>,
+    /// Ground nearer to the target counts as good on the hazard map, m (0: none; 0 to 5; R100).
+    pub exemption_radius_m: f64,
     /// The drive stops when the slip of a step is measured as larger, as a part of the wheels' motion (0.9; 0.05 to 2). Without
     /// odometry it has no effect.
     pub slip_max: f64,
@@ -91,6 +140,9 @@ impl Default for DriveCommand {
             odometry: OdometryMode::Full,
             odometry_pair: OdometryPair::Shared,
             odometry_preset: OdometryPreset::Sightline,
+            navigator: NavigatorKind::Arcs,
+            hazard_camera: None,
+            exemption_radius_m: 0.0,
             slip_max: 0.9,
             tilt_max_deg: 30.0,
             flight_minutes_max: 480.0,
@@ -117,6 +169,7 @@ impl DriveCommand {
         within("tolerance_m", self.tolerance_m, 0.001, 1.0)?;
         within("step_fraction", self.step_fraction, 0.01, 0.5)?;
         within("stops_max", f64::from(self.stops_max), 2.0, 1000.0)?;
+        within("exemption_radius_m", self.exemption_radius_m, 0.0, 5.0)?;
         within("slip_max", self.slip_max, 0.05, 2.0)?;
         within("tilt_max_deg", self.tilt_max_deg, 1.0, 45.0)?;
         within("flight_minutes_max", self.flight_minutes_max, 1.0, 10_000.0)?;

@@ -17,23 +17,18 @@ use sightline_track::target::TrackingState;
 use sightline_track::trace::StepTrace;
 
 use super::active_world::{ActiveWorld, DriveReport};
-use super::command::{ArrivalAction, DriveCommand, GoalRule, TrackedStops};
+use super::command::{ArrivalAction, DriveCommand, GoalRule};
 use super::dead_reckoning::Reckoned;
 use super::flight_time::FlightTime;
+use super::map_hazards::StopHazards;
 use super::motion::Motion;
+use super::next_motion::{self, slip_to};
 use super::odometry::{self, OdometryPair};
-use super::select_path::{Navigator, PathInput};
+use super::path_choice::PathChoice;
+use super::select_path::Navigator;
 use super::set_goal::{Goal, set_goal};
 use crate::pipeline::{self, StepChanges, Stops};
-use crate::visual_odometry::{OdometryMode, pose_change_error};
-
-/// Longest step and largest turn that odometry follows, m and rad (driving.md 1: 75 cm, 18°).
-const STEP_MAX_M: f64 = 0.75;
-const TURN_MAX_RAD: f64 = 18.0 * std::f64::consts::PI / 180.0;
-/// Slip either way that the next step makes good.
-const SLIP_MADE_GOOD: f64 = 0.5;
-/// Shortest part of a step, where the slip left less of it, m.
-const PART_MIN_M: f64 = 0.1;
+use crate::visual_odometry::pose_change_error;
 
 /// Why a drive stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -53,21 +48,42 @@ pub enum StopReason {
     Time,
     /// The number of stops is used up.
     StopLimit,
+    /// Every path is vetoed by the hazard map.
+    NoSafePath,
+    /// The pair of the hazard map is missing, or gives too few points.
+    NoRangeData,
 }
 
 /// The end of a drive.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Ending {
     /// Why it stopped.
     pub reason: StopReason,
-    /// The value that decided, in the unit of its limit: m, a part, deg, min, a count; null for `lost` and `stalled`.
+    /// The value that decided, in the unit of its limit: m, a part, deg, min, a count; null for `lost`, `stalled` and
+    /// `no_safe_path`, and for a missing pair.
     pub value: Option<f64>,
-    /// The limit of the command that it met; null for `lost` and `stalled`.
+    /// The limit that it met; null where `value` is.
     pub limit: Option<f64>,
+    /// The reason in more detail: the smallest change of a limit that opens a path, or why there are no range data; null for the
+    /// other reasons.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub detail: Option<String>,
+}
+
+impl Ending {
+    /// An end for a value beyond its limit.
+    pub(super) fn beyond(reason: StopReason, value: f64, limit: f64) -> Self {
+        Self { reason, value: Some(value), limit: Some(limit), detail: None }
+    }
+
+    /// An end without a value.
+    pub(super) fn named(reason: StopReason, detail: Option<String>) -> Self {
+        Self { reason, value: None, limit: None, detail }
+    }
 }
 
 /// The decision at a stop, made once the target is located there.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Cycle {
     /// The number of the stop.
     pub step: usize,
@@ -82,6 +98,12 @@ pub struct Cycle {
     /// Whether odometry runs alone at the stop that the motion leads to: it is a part of a step.
     #[serde(default)]
     pub odometry_alone: bool,
+    /// Number of points that the pair of the hazard map gives at this stop; null without a hazard map.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub range_points: Option<usize>,
+    /// Every path that was considered on the hazard map; null where no path was chosen on one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub choice: Option<PathChoice>,
     /// The rover's report of the motion; null without one.
     pub report: Option<DriveReport>,
     /// Actions after arrival that were begun, the one decided here included.
@@ -107,6 +129,8 @@ pub struct CycleInput<'a> {
     pub last: &'a StepTrace,
     /// The cycle of the stop before; `None` at the first.
     pub before: Option<&'a Cycle>,
+    /// The goodness map of the stop, from `HazardMaps::at`; `None` for a navigator without one.
+    pub hazards: Option<&'a StopHazards>,
 }
 
 /// One cycle: decides at the last stop and, unless the drive ends there, drives, points the mast and tracks at the next.
@@ -186,6 +210,9 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
     if input.last.is_odometry_alone() {
         time = time.without_tracking(input.command.odometry_pair);
     }
+    if let Some(sizes) = input.hazards.and_then(|hazards| hazards.image_sizes) {
+        time = time.with_hazards(sizes);
+    }
     let flight_minutes = input.before.map_or(0.0, |before| before.flight_minutes) + time.total_s() / 60.0;
     let arrival_actions = input.before.map_or(0, |before| before.arrival_actions);
     let [estimated, by_wheels] = reckoned(stops, input, &pose);
@@ -196,6 +223,8 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
         by_wheels,
         motion: None,
         odometry_alone: false,
+        range_points: input.hazards.and_then(StopHazards::point_count),
+        choice: None,
         report: None,
         arrival_actions,
         flight: time,
@@ -213,21 +242,7 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
     if cycle.ending.is_none() && !goal.arrived {
         let target_in_rover = pose.inverse_transform_point(&target_in_site);
         let distance_m = (target_in_rover - left.model.centre()).norm();
-        let choice = input.navigator.select_path(&PathInput {
-            goal_m: goal.in_rover_m,
-            step_m: step_m(input, distance_m),
-            curvature_per_m: input
-                .before
-                .and_then(|before| before.motion)
-                .map_or(0.0, |m| m.curvature_per_m()),
-            map: None,
-            site_from_rover: &pose,
-        });
-        if let Some(motion) = choice.motion() {
-            let (motion, is_part) = followable(motion, input.command, slip_to(stops, step));
-            cycle.motion = Some(motion);
-            cycle.odometry_alone = is_part && input.command.tracked_stops == TrackedStops::ByDistance;
-        }
+        next_motion::choose(stops, input, &mut cycle, distance_m);
     }
     cycle
 }
@@ -262,46 +277,6 @@ fn target_in_site(input: &CycleInput<'_>, stops: &dyn Stops) -> Point3 {
     stops.site_from_rover(from.step) * from.update.target.position_in_rover
 }
 
-/// Largest length of the next motion, m. After a stop for odometry alone, this is the rest of the step.
-fn step_m(input: &CycleInput<'_>, distance_m: f64) -> f64 {
-    let step_m = input.command.step_fraction * distance_m;
-    if !input.last.is_odometry_alone() {
-        return step_m;
-    }
-    (step_m - input.last.update.target.travelled_since_update_m).max(PART_MIN_M)
-}
-
-/// A motion that odometry can follow: at most 75 cm and 18°, and longer by the slip of the step before (driving.md 1). True where
-/// it is a part of the wanted one.
-fn followable(motion: Motion, command: &DriveCommand, slip: Option<f64>) -> (Motion, bool) {
-    if command.odometry == OdometryMode::Off {
-        return (motion, false);
-    }
-    match motion {
-        Motion::Turn { angle_rad } => {
-            let followed_rad = angle_rad.clamp(-TURN_MAX_RAD, TURN_MAX_RAD);
-            (Motion::Turn { angle_rad: followed_rad }, followed_rad != angle_rad)
-        }
-        Motion::Arc { length_m, curvature_per_m } => {
-            let max_m = STEP_MAX_M.min(TURN_MAX_RAD / curvature_per_m.abs());
-            let lost = slip.unwrap_or(0.0).clamp(-SLIP_MADE_GOOD, SLIP_MADE_GOOD);
-            let is_part = length_m.abs() > max_m;
-            let followed_m = match command.tracked_stops {
-                TrackedStops::Every => length_m.clamp(-max_m, max_m),
-                // The parts of a step have the same length.
-                TrackedStops::ByDistance => length_m / (length_m.abs() / max_m).ceil().max(1.0),
-            };
-            (Motion::Arc { length_m: followed_m / (1.0 - lost), curvature_per_m }, is_part)
-        }
-    }
-}
-
-/// The slip along the motion to a stop, where it was measured.
-fn slip_to(stops: &dyn Stops, step: usize) -> Option<f64> {
-    let update = &stops.measured_motion(step)?.update;
-    Some(update.slip.filter(|_| update.accepted)?.along)
-}
-
 /// Points the mast of the last stop at the prediction from the stop before, and exposes around it.
 ///
 /// # Errors
@@ -321,9 +296,8 @@ pub fn point_mast(world: &mut dyn ActiveWorld, last: &Updated) -> Result<()> {
 /// Why the drive ends at this stop, if it does.
 fn ending(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &Cycle) -> Option<Ending> {
     let command = input.command;
-    let end =
-        |reason, value: f64, limit: f64| Some(Ending { reason, value: Some(value), limit: Some(limit) });
-    let named = |reason| Some(Ending { reason, value: None, limit: None });
+    let end = |reason, value: f64, limit: f64| Some(Ending::beyond(reason, value, limit));
+    let named = |reason| Some(Ending::named(reason, None));
     // A later look may put the goal a little elsewhere; the rover has arrived all the same.
     if (cycle.goal.arrived && !input.last.is_odometry_alone()) || cycle.arrival_actions > 0 {
         return end(StopReason::Arrived, cycle.goal.distance_m, command.tolerance_m);

@@ -6,6 +6,7 @@
 //! | capture | 30 s for a 12-bit 1024 × 1024 pair, less with fewer pixels, 5 s at least | R148 |
 //! | locate | 5 s: correlation 4 s, point stereo 1 s | R147 |
 //! | visual odometry | 90 s for each update, and point_mast and capture for a pair of its own | R149 |
+//! | select_path | the pair of the hazard map, as capture; the map itself is not included | ours |
 //! | drive | 3.75 cm/s, 2.1°/s | domain.md 5.4 |
 //!
 //! Unit: s.
@@ -39,21 +40,45 @@ pub struct FlightTime {
     pub capture_s: f64,
     /// Finding the target.
     pub locate_s: f64,
+    /// Exposing and transferring the pair of the hazard map; 0 without one. The computation of the map is not included.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub hazards_s: f64,
     /// Driving to the next stop.
     pub drive_s: f64,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_zero(value_s: &f64) -> bool {
+    *value_s == 0.0
+}
+
+/// Exposing and transferring a pair, s.
+fn capture_s(image_sizes: [[u32; 2]; 2]) -> f64 {
+    let pixels: f64 = image_sizes.iter().map(|[width, height]| f64::from(*width) * f64::from(*height)).sum();
+    (CAPTURE_S * pixels / CAPTURE_PX).max(CAPTURE_MIN_S)
 }
 
 impl FlightTime {
     /// A tracked stop whose images have these sizes, px, without the drive that follows.
     pub fn of_stop(image_sizes: [[u32; 2]; 2], odometry: Option<&MeasuredMotion>) -> Self {
-        let pixels: f64 =
-            image_sizes.iter().map(|[width, height]| f64::from(*width) * f64::from(*height)).sum();
-        let capture_s = (CAPTURE_S * pixels / CAPTURE_PX).max(CAPTURE_MIN_S);
+        let capture_s = capture_s(image_sizes);
         let pair_s = POINT_MAST_S + capture_s;
         let odometry_s = odometry.map_or(0.0, |measured| {
             f64::from(measured.updates()) * ODOMETRY_S + f64::from(measured.own_pairs()) * pair_s
         });
-        Self { odometry_s, point_mast_s: POINT_MAST_S, capture_s, locate_s: 5.0, drive_s: 0.0 }
+        Self {
+            odometry_s,
+            point_mast_s: POINT_MAST_S,
+            capture_s,
+            locate_s: 5.0,
+            hazards_s: 0.0,
+            drive_s: 0.0,
+        }
+    }
+
+    /// The same of a stop with a pair for the hazard map, whose images have these sizes, px.
+    pub(crate) fn with_hazards(self, image_sizes: [[u32; 2]; 2]) -> Self {
+        Self { hazards_s: capture_s(image_sizes), ..self }
     }
 
     /// The same of a stop at which odometry runs alone, in the pair that the tracker would have or in one of its own.
@@ -73,13 +98,14 @@ impl FlightTime {
             CycleStage::Capture => self.capture_s,
             CycleStage::Locate => self.locate_s,
             CycleStage::Drive => self.drive_s,
-            CycleStage::Judge | CycleStage::Update | CycleStage::SetGoal | CycleStage::SelectPath => 0.0,
+            CycleStage::SelectPath => self.hazards_s,
+            CycleStage::Judge | CycleStage::Update | CycleStage::SetGoal => 0.0,
         }
     }
 
     /// All stages together, s.
     pub(crate) fn total_s(&self) -> f64 {
-        self.odometry_s + self.point_mast_s + self.capture_s + self.locate_s + self.drive_s
+        self.odometry_s + self.point_mast_s + self.capture_s + self.locate_s + self.hazards_s + self.drive_s
     }
 }
 

@@ -1,7 +1,7 @@
 //! Targeted driving: the stages after tracking, and the loop that repeats them at every stop (R1–R8, R94–R97, R104–R107).
 //!
 //! ```text
-//! last step ─► set_goal ─► select_path ─► drive ─► point_mast ─► odometry ─► run_step ─► next step
+//! last step ─► set_goal ─► map_hazards ─► select_path ─► drive ─► point_mast ─► odometry ─► run_step ─► next step
 //! ```
 //! [`executive`] is the loop; it asks an [`ActiveWorld`] to move the rover and sees estimates alone.
 
@@ -10,17 +10,20 @@ pub mod command;
 pub mod dead_reckoning;
 pub mod executive;
 pub mod flight_time;
+pub mod map_hazards;
 pub mod motion;
+mod next_motion;
 pub mod odometry;
 pub mod path_choice;
 pub mod select_path;
 pub mod set_goal;
 
 pub use active_world::{ActiveWorld, DriveReport, Stall};
-pub use command::{ArrivalAction, DriveCommand, GoalRule, TrackedStops};
+pub use command::{ArrivalAction, DriveCommand, GoalRule, NavigatorKind, TrackedStops};
 pub use dead_reckoning::Reckoned;
 pub use executive::{Cycle, Ending, StopReason};
 pub use flight_time::FlightTime;
+pub use map_hazards::{HazardMaps, RangeData, StopHazards};
 pub use motion::Motion;
 pub use odometry::OdometryPair;
 pub use path_choice::{Candidate, PathChoice, PathTerms, Veto};

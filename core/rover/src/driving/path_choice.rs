@@ -82,4 +82,9 @@ impl PathChoice {
     pub fn motion(&self) -> Option<Motion> {
         Some(self.candidates.get(self.chosen?)?.motion)
     }
+
+    /// Number of paths that must not be driven.
+    pub fn vetoed_count(&self) -> usize {
+        self.candidates.iter().filter(|candidate| candidate.veto.is_some()).count()
+    }
 }

@@ -20,6 +20,7 @@ use sightline_geometry::frames::Pose;
 use super::motion::Motion;
 use super::path_choice::{Candidate, PathChoice};
 use crate::hazards::goodness::GoodnessMap;
+use crate::navigation::counterfactual::LimitChange;
 
 /// What a navigator decides from.
 #[derive(Clone, Copy, Debug)]
@@ -40,6 +41,12 @@ pub struct PathInput<'a> {
 pub trait Navigator {
     /// The motion towards the goal, with every path that was considered; no motion if no path is safe.
     fn select_path(&self, input: &PathInput<'_>) -> PathChoice;
+
+    /// The smallest raised limit that opens a vetoed path of a choice; `None` if no single one does, and for a navigator without
+    /// limits.
+    fn smallest_change(&self, _input: &PathInput<'_>, _choice: &PathChoice) -> Option<LimitChange> {
+        None
+    }
 }
 
 /// A navigator without a hazard map.

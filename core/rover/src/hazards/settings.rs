@@ -49,6 +49,8 @@ settings_group! {
         range_uniqueness_min: f64 = 0.15, "", Domain::Between(0.0, 1.0), "ours; docs/driving.md";
         /// Patches of fewer pixels are left out (blob filter).
         range_speckle_px: u32 = 250, "px", Domain::Between(0.0, 100_000.0), "ours; domain.md 7: JPL 4 % of the image";
+        /// A stop of a drive whose pair gives fewer points has no range data.
+        range_points_min: u32 = 200, "", Domain::Between(1.0, 100_000.0), "ours";
         /// Points nearer to the rover's axis along its length and …
         own_half_length_m: f64 = 0.95, "m", Domain::Between(0.0, 3.0), "domain.md 5.4";
         /// … across its width are left out: they are its own wheels and panels.

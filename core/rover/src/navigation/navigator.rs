@@ -27,6 +27,7 @@ use crate::driving::path_choice::{Candidate, PathChoice, PathTerms, Veto};
 use crate::driving::select_path::{ArcNavigator, Navigator, PathInput};
 use crate::hazards::goodness::GoodnessMap;
 
+use super::counterfactual::{LimitChange, counterfactual};
 use super::ground::Ground;
 use super::limits::VetoLimits;
 use super::path::{Path, Stance};
@@ -49,6 +50,10 @@ impl Navigator for HazardNavigator {
             Some(map) => self.select_on(map, input),
             None => ArcNavigator::default().select_path(input),
         }
+    }
+
+    fn smallest_change(&self, input: &PathInput<'_>, choice: &PathChoice) -> Option<LimitChange> {
+        counterfactual(choice, input, &self.settings, None).into_iter().next()
     }
 }
 

@@ -1,0 +1,230 @@
+//! Stage 8 in the loop, `map_hazards`: the goodness map of each stop, from the images of one pair of every stop since the designation.
+//!
+//! ```text
+//! pair of stop k ─► range_points ─► map_hazards (map of stop k − 1, pose estimate of stop k) ─► assess ─► goodness map of stop k
+//! ```
+//! The map of a stop is a function of the stops up to it and of the command: a drive that is resumed or branched has the same bits.
+//! [`HazardMaps`] keeps the results, so that a decision that is requested again costs no second stereo.
+//!
+//! Frame: site. Sources: domain.md 8; papers.md R9, R99–R102.
+
+use std::sync::Arc;
+
+use sightline_geometry::camera::CameraName;
+use sightline_geometry::cancel::Cancel;
+use sightline_geometry::error::{Error, Result};
+use sightline_geometry::frames::{Point3, Pose};
+use sightline_track::trace::StepTrace;
+
+use super::command::DriveCommand;
+use crate::hazards::{
+    GoodnessMap, HazardMap, HazardSettings, MapRules, Scan, assess, map_hazards, range_points,
+};
+use crate::pair::{self, FurtherCamera};
+use crate::pipeline::Stops;
+
+/// The outcome of the pair of a stop.
+#[derive(Clone, Debug, PartialEq)]
+pub enum RangeData {
+    /// The number of its points.
+    Points(usize),
+    /// The reason why there are none.
+    Missing(String),
+}
+
+/// The hazards of one stop.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StopHazards {
+    /// The stop.
+    pub step: usize,
+    /// Range data of the stop.
+    pub range: RangeData,
+    /// Sizes of the two images, px; `None` without a pair.
+    pub image_sizes: Option<[[u32; 2]; 2]>,
+    /// The goodness map.
+    pub map: GoodnessMap,
+}
+
+impl StopHazards {
+    /// The number of points; `None` without a pair.
+    pub fn point_count(&self) -> Option<usize> {
+        match self.range {
+            RangeData::Points(count) => Some(count),
+            RangeData::Missing(_) => None,
+        }
+    }
+}
+
+/// The pair of the hazard map of a command, at the stop of the designation; `None` for a navigator without a map.
+///
+/// # Errors
+/// [`Error::Setting`] for a stop without such a pair.
+pub fn hazard_camera(stops: &dyn Stops, step: usize, command: &DriveCommand) -> Result<Option<CameraName>> {
+    if !command.navigator.needs_map() {
+        return Ok(None);
+    }
+    let cameras = stops.further_cameras(step);
+    if let Some(name) = command.hazard_camera {
+        if cameras.iter().any(|camera| camera.name == name && camera.right.is_some()) {
+            return Ok(Some(name));
+        }
+        let problem = format!("stop {step} has no pair `{name}`; {}", choices(&cameras));
+        return Err(Error::setting("hazard_camera", problem));
+    }
+    let is_hazcam = |camera: &&FurtherCamera<'_>| {
+        camera.right.is_some() && camera.mast_angles.is_none() && camera.left.model.axis().x > 0.0
+    };
+    if let Some(camera) = cameras.iter().find(is_hazcam) {
+        return Ok(Some(camera.name));
+    }
+    let problem = format!(
+        "`{}` needs a pair of hazcams at every stop, and this drive has none; add one with rig mer_front_hazcam to camera.further \
+         of the scenario, name another pair as hazard_camera, or choose `arcs`",
+        command.navigator.name()
+    );
+    Err(Error::setting("navigator", problem))
+}
+
+fn choices(cameras: &[FurtherCamera<'_>]) -> String {
+    let pairs = cameras.iter().filter(|camera| camera.right.is_some());
+    let names: Vec<String> = pairs.map(|camera| format!("`{}`", camera.name)).collect();
+    if names.is_empty() {
+        return "it has no pair beside the main one: add one to camera.further of the scenario".to_owned();
+    }
+    format!("choose {}", names.join(" or "))
+}
+
+/// Range data of a stop in the map.
+#[derive(Clone, Debug)]
+struct Mapped {
+    site_from_rover: Pose,
+    range: RangeData,
+    image_sizes: Option<[[u32; 2]; 2]>,
+    /// The last goodness map that was requested, and its rules.
+    assessed: Option<(MapRules, Arc<StopHazards>)>,
+}
+
+/// The hazard maps of a drive, computed stop by stop and kept.
+#[derive(Clone, Debug, Default)]
+pub struct HazardMaps {
+    settings: HazardSettings,
+    /// Pair and first stop of the map.
+    source: Option<(CameraName, usize)>,
+    /// By stop since the first.
+    stops: Vec<Mapped>,
+    /// The map of the last of them, with the distance driven, m.
+    map: Option<HazardMap>,
+    driven_m: f64,
+}
+
+impl HazardMaps {
+    /// The hazards of the stop of a step of a drive since the designation; `None` for a navigator without a map.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`].
+    pub fn at(
+        &mut self,
+        stops: &dyn Stops,
+        command: &DriveCommand,
+        [first, last]: [&StepTrace; 2],
+        cancel: Cancel<'_>,
+    ) -> Result<Option<Arc<StopHazards>>> {
+        let camera = match hazard_camera(stops, first.step, command) {
+            Ok(Some(camera)) => camera,
+            // Refused at the begin of the drive; a command that was changed on the way has no range data.
+            Ok(None) | Err(_) => return Ok(None),
+        };
+        let index = last.step - first.step;
+        if self.source != Some((camera, first.step)) || !self.is_of(stops, first.step) {
+            self.clear();
+        }
+        self.source = Some((camera, first.step));
+        self.settings.exemption_radius_m = command.exemption_radius_m;
+        let target = stops.site_from_rover(last.step) * last.update.target.position_in_rover;
+        let rules = self.rules(stops, [first.step, last.step], [target.x, target.y]);
+        if let Some((known, hazards)) = self.stops.get(index).and_then(|mapped| mapped.assessed.as_ref())
+            && *known == rules
+        {
+            return Ok(Some(Arc::clone(hazards)));
+        }
+        if self.stops.len() > index + 1 {
+            // The map itself is kept for the last stop alone.
+            self.clear();
+            self.source = Some((camera, first.step));
+        }
+        while self.stops.len() <= index {
+            self.map_next(stops, (camera, first.step + self.stops.len()), cancel)?;
+        }
+        let (Some(map), Some(mapped)) = (&self.map, self.stops.get_mut(index)) else { return Ok(None) };
+        let hazards = Arc::new(StopHazards {
+            step: last.step,
+            range: mapped.range.clone(),
+            image_sizes: mapped.image_sizes,
+            map: assess(map, &rules, &self.settings),
+        });
+        mapped.assessed = Some((rules, Arc::clone(&hazards)));
+        Ok(Some(hazards))
+    }
+
+    fn clear(&mut self) {
+        *self = Self { settings: self.settings.clone(), ..Self::default() };
+    }
+
+    /// Whether the stops are those of the map.
+    fn is_of(&self, stops: &dyn Stops, first: usize) -> bool {
+        let is_known = |(step, mapped): (usize, &Mapped)| {
+            step < stops.stop_count() && stops.site_from_rover(step) == mapped.site_from_rover
+        };
+        (first..).zip(&self.stops).all(is_known)
+    }
+
+    fn rules(&self, stops: &dyn Stops, steps: [usize; 2], target_m: [f64; 2]) -> MapRules {
+        let [start_m, rover_m] = steps.map(|step| {
+            let origin = stops.site_from_rover(step).translation.vector;
+            [origin.x, origin.y]
+        });
+        MapRules::at(rover_m, start_m, Some(target_m), &self.settings)
+    }
+
+    /// Adds the next stop to the map.
+    fn map_next(
+        &mut self,
+        stops: &dyn Stops,
+        (camera, step): (CameraName, usize),
+        cancel: Cancel<'_>,
+    ) -> Result<()> {
+        cancel.check()?;
+        let sizes = |pair: &pair::StopPair<'_>| [pair.left.size, pair.right.size];
+        let image_sizes = stops.further_pair(step, camera).ok().as_ref().map(sizes);
+        let (points, range) = match self.points(stops, (camera, step), cancel) {
+            Ok(points) => {
+                let range = RangeData::Points(points.len());
+                (points, range)
+            }
+            Err(Error::Cancelled) => return Err(Error::Cancelled),
+            Err(error) => (Vec::new(), RangeData::Missing(error.to_string())),
+        };
+        let site_from_rover = stops.site_from_rover(step);
+        let moved = self.stops.last().map_or(0.0, |before| {
+            let moved = site_from_rover.translation.vector - before.site_from_rover.translation.vector;
+            moved.x.hypot(moved.y)
+        });
+        self.driven_m += moved;
+        let scan =
+            Scan { points_in_rover: &points, site_from_rover: &site_from_rover, driven_m: self.driven_m };
+        self.map = Some(map_hazards(self.map.as_ref(), &scan, &self.settings));
+        self.stops.push(Mapped { site_from_rover, range, image_sizes, assessed: None });
+        Ok(())
+    }
+
+    fn points(
+        &self,
+        stops: &dyn Stops,
+        (camera, step): (CameraName, usize),
+        cancel: Cancel<'_>,
+    ) -> Result<Vec<Point3>> {
+        let pair = stops.further_pair(step, camera)?;
+        let images = stops.capture_further(step, camera, cancel)?;
+        range_points([&images.left, &images.right], [pair.left, pair.right], &self.settings, cancel)
+    }
+}

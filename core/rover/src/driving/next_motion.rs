@@ -1,0 +1,114 @@
+//! The motion of a cycle: asks the navigator for a path and cuts it to what visual odometry follows.
+//!
+//! With a navigator on a hazard map the drive ends here without range data and where every path is vetoed; the rover then stays.
+
+use super::command::{DriveCommand, TrackedStops};
+use super::executive::{Cycle, CycleInput, Ending, StopReason};
+use super::map_hazards::RangeData;
+use super::motion::Motion;
+use super::select_path::PathInput;
+use crate::hazards::goodness::GoodnessMap;
+use crate::navigation::counterfactual::LimitChange;
+use crate::pipeline::Stops;
+use crate::visual_odometry::OdometryMode;
+
+/// Longest step and largest turn that odometry follows, m and rad (driving.md 1: 75 cm, 18°).
+const STEP_MAX_M: f64 = 0.75;
+const TURN_MAX_RAD: f64 = 18.0 * std::f64::consts::PI / 180.0;
+/// Slip either way that the next step makes good.
+const SLIP_MADE_GOOD: f64 = 0.5;
+/// Shortest part of a step, where the slip left less of it, m.
+const PART_MIN_M: f64 = 0.1;
+
+/// Chooses the motion of a cycle whose target is `distance_m` from the left camera, or ends the drive.
+pub(super) fn choose(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &mut Cycle, distance_m: f64) {
+    let map = match range(input) {
+        Ok(map) => map,
+        Err(ending) => {
+            cycle.ending = Some(ending);
+            return;
+        }
+    };
+    let path_input = PathInput {
+        goal_m: cycle.goal.in_rover_m,
+        step_m: step_m(input, distance_m),
+        curvature_per_m: input.before.and_then(|before| before.motion).map_or(0.0, |m| m.curvature_per_m()),
+        map,
+        site_from_rover: &stops.site_from_rover(cycle.step),
+    };
+    let choice = input.navigator.select_path(&path_input);
+    match choice.motion() {
+        Some(motion) => {
+            let (motion, is_part) = followable(motion, input.command, slip_to(stops, cycle.step));
+            cycle.motion = Some(motion);
+            cycle.odometry_alone = is_part && input.command.tracked_stops == TrackedStops::ByDistance;
+        }
+        None => {
+            let change = input.navigator.smallest_change(&path_input, &choice);
+            let detail = change.as_ref().map_or_else(no_change, LimitChange::sentence);
+            cycle.ending = Some(Ending::named(StopReason::NoSafePath, Some(detail)));
+        }
+    }
+    cycle.choice = Some(choice).filter(|_| map.is_some());
+}
+
+fn no_change() -> String {
+    "no single raised limit opens a path".to_owned()
+}
+
+/// The goodness map of the stop, if the navigator needs one.
+fn range<'a>(input: &CycleInput<'a>) -> Result<Option<&'a GoodnessMap>, Ending> {
+    if !input.command.navigator.needs_map() {
+        return Ok(None);
+    }
+    let missing = |fault: &str| Ending::named(StopReason::NoRangeData, Some(fault.to_owned()));
+    let hazards = input.hazards.ok_or_else(|| missing("the stop has no hazard map"))?;
+    match &hazards.range {
+        RangeData::Missing(fault) => Err(missing(fault)),
+        RangeData::Points(count) => {
+            let (count, least) = (*count as f64, f64::from(hazards.map.settings.range_points_min));
+            let few = || Ending::beyond(StopReason::NoRangeData, count, least);
+            if count < least { Err(few()) } else { Ok(Some(&hazards.map)) }
+        }
+    }
+}
+
+/// Largest length of the next motion, m. After a stop for odometry alone, this is the rest of the step.
+fn step_m(input: &CycleInput<'_>, distance_m: f64) -> f64 {
+    let step_m = input.command.step_fraction * distance_m;
+    if !input.last.is_odometry_alone() {
+        return step_m;
+    }
+    (step_m - input.last.update.target.travelled_since_update_m).max(PART_MIN_M)
+}
+
+/// A motion that odometry can follow: at most 75 cm and 18°, and longer by the slip of the step before (driving.md 1). True where
+/// it is a part of the wanted one.
+fn followable(motion: Motion, command: &DriveCommand, slip: Option<f64>) -> (Motion, bool) {
+    if command.odometry == OdometryMode::Off {
+        return (motion, false);
+    }
+    match motion {
+        Motion::Turn { angle_rad } => {
+            let followed_rad = angle_rad.clamp(-TURN_MAX_RAD, TURN_MAX_RAD);
+            (Motion::Turn { angle_rad: followed_rad }, followed_rad != angle_rad)
+        }
+        Motion::Arc { length_m, curvature_per_m } => {
+            let max_m = STEP_MAX_M.min(TURN_MAX_RAD / curvature_per_m.abs());
+            let lost = slip.unwrap_or(0.0).clamp(-SLIP_MADE_GOOD, SLIP_MADE_GOOD);
+            let is_part = length_m.abs() > max_m;
+            let followed_m = match command.tracked_stops {
+                TrackedStops::Every => length_m.clamp(-max_m, max_m),
+                // The parts of a step have the same length.
+                TrackedStops::ByDistance => length_m / (length_m.abs() / max_m).ceil().max(1.0),
+            };
+            (Motion::Arc { length_m: followed_m / (1.0 - lost), curvature_per_m }, is_part)
+        }
+    }
+}
+
+/// The slip along the motion to a stop, where it was measured.
+pub(super) fn slip_to(stops: &dyn Stops, step: usize) -> Option<f64> {
+    let update = &stops.measured_motion(step)?.update;
+    Some(update.slip.filter(|_| update.accepted)?.along)
+}
