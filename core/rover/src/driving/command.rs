@@ -60,12 +60,12 @@ impl NavigatorKind {
     }
 
     /// Whether it needs a hazard map.
-    pub fn needs_map(self) -> bool {
+    pub(super) fn needs_map(self) -> bool {
         self != Self::Arcs
     }
 
     /// Its name in a command.
-    pub fn name(self) -> &'static str {
+    pub(super) fn name(self) -> &'static str {
         match self {
             Self::Arcs => "arcs",
             Self::Gestalt => "gestalt",

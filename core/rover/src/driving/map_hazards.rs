@@ -47,7 +47,7 @@ pub struct StopHazards {
 
 impl StopHazards {
     /// The number of points; `None` without a pair.
-    pub fn point_count(&self) -> Option<usize> {
+    pub(super) fn point_count(&self) -> Option<usize> {
         match self.range {
             RangeData::Points(count) => Some(count),
             RangeData::Missing(_) => None,

@@ -19,6 +19,7 @@ pub struct PathTerms {
 
 /// Why a path must not be driven: its first failing cell.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = PathVeto)]
 pub struct Veto {
     /// Centre of the cell, x and y of the site frame, m.
     pub in_site_m: [f64; 2],
@@ -34,6 +35,7 @@ pub struct Veto {
 
 /// A path that was considered.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = PathCandidate)]
 pub struct Candidate {
     /// The motion, as it would be driven.
     pub motion: Motion,
