@@ -9,6 +9,7 @@ mod features;
 mod shape_tracker;
 mod shape_tracker_recorded;
 mod trackability;
+mod trackability_convergent;
 mod records;
 mod rendering;
 mod driving;

@@ -1,14 +1,9 @@
 //! The criteria against pictures whose answer is known, and the map against a plane whose truth is exact.
 
-use std::sync::atomic::AtomicBool;
-
 use image::Luma;
 
-use sightline_geometry::camera::{Cahv, Camera, CameraModel};
 use sightline_geometry::error::Error;
-use sightline_geometry::frames::{Pixel, Pose, Vector3};
-use sightline_geometry::stereo_geometry::StereoGeometry;
-use sightline_recordings::{Traverse, import};
+use sightline_geometry::frames::{Pixel, Pose};
 use sightline_rover::pipeline;
 use sightline_rover::trackability::depth::edge_distances;
 use sightline_rover::trackability::ground::Measured;
@@ -209,74 +204,4 @@ fn where_nothing_is_seen_everything_is_bad_and_there_is_no_good_pixel() {
     let limits = TrackabilityLimits::default();
     assert!(Ground::new(&world, 0, &Settings::default(), &limits).is_err());
     assert!(matches!(Ground::new(&world, 7, &Settings::default(), &limits), Err(Error::Target(_))));
-}
-
-/// The plane seen by a camera whose mast turned by 0.08 rad, which moved it mostly along its line of sight.
-fn convergent_plane() -> PlaneWorld {
-    let mut world = plane();
-    let (sine, cosine) = 0.08_f64.sin_cos();
-    let axis = Vector3::new(cosine, sine, 0.0);
-    let horizontal = Vector3::new(-sine, cosine, 0.0) * 600.0 + axis * 127.5;
-    let vertical = Vector3::z() * 600.0 + axis * 127.5;
-    let centre = world.left.model.centre() + Vector3::new(0.3, 0.2, 0.0);
-    let model = CameraModel::Cahv(Cahv::as_printed(centre, axis, horizontal, vertical));
-    world.right = Camera::new(model, 256, 256);
-    world.stereo = StereoGeometry::Convergent;
-    world
-}
-
-#[test]
-fn a_convergent_pair_has_ranges_wherever_both_views_overlap() {
-    let world = convergent_plane();
-    let ground = ground(&world);
-    let map = TrackabilityMap::of(&ground);
-    let (mut seen, mut ranged) = (0, 0);
-    for cell in map.cells() {
-        let point = world.plane_point(0, &world.left, cell.pixel).unwrap();
-        let right = world.right.project(&point).unwrap();
-        let margin_px = cell.pixel.x.min(cell.pixel.y).min(255.0 - cell.pixel.x).min(255.0 - cell.pixel.y);
-        let right_margin_px = right.x.min(right.y).min(255.0 - right.x).min(255.0 - right.y);
-        if margin_px.min(right_margin_px) < 20.0 {
-            continue;
-        }
-        seen += 1;
-        let Some(range_m) = cell.range_m else { continue };
-        ranged += 1;
-        let truth_m = (point - world.left.model.centre()).norm();
-        assert!((range_m / truth_m - 1.0).abs() < 0.1, "{:?}: {range_m} of {truth_m}", cell.pixel);
-    }
-    assert!(seen > 300 && ranged * 20 > seen * 19, "{ranged} of {seen}");
-    // The plane is smooth and textured: nothing speaks against most of it.
-    let [good, risky, _] = map.shares();
-    assert!(good + risky > 0.4, "{:?}", map.shares());
-    let outside = ground.assess(Pixel::new(12.0, 128.0), false);
-    assert_eq!((outside.verdict, outside.reason), (Verdict::Bad, Some(Aspect::Range)));
-}
-
-#[test]
-fn the_overlap_of_the_opportunity_pair_is_not_a_stereo_hole() {
-    let set = sightline_testdata::recorded("mer1-navcam-sol4087-pair", "trackability of a convergent pair");
-    let Some(set) = set else { return };
-    let folder = tempfile::tempdir().unwrap();
-    let (never, pair) = (AtomicBool::new(false), folder.path().join("pair"));
-    import::import(&set, &import::ImportOptions::default(), &pair, &mut |_, _| {}, &never).unwrap();
-    let traverse = Traverse::open(&pair).unwrap();
-    let limits = TrackabilityLimits::default();
-    let ground = Ground::new(&traverse, 0, &Settings::default(), &limits).unwrap();
-    let text = std::fs::read_to_string(set.join("reference_matches.csv")).unwrap();
-    let pixels = text.lines().filter_map(|line| {
-        let mut numbers = line.split(',').map_while(|value| value.trim().parse::<f64>().ok());
-        Some(Pixel::new(numbers.next()?, numbers.next()?))
-    });
-    let (mut holes, mut usable, mut all, mut reasons) = (0, 0, 0, std::collections::BTreeMap::new());
-    for pixel in pixels.step_by(4) {
-        let seen = ground.assess(pixel, false);
-        all += 1;
-        holes += usize::from(seen.reason == Some(Aspect::Range));
-        usable += usize::from(seen.verdict != Verdict::Bad);
-        *reasons.entry(format!("{:?} {:?}", seen.verdict, seen.reason)).or_insert(0) += 1;
-    }
-    println!("{all} matches: {reasons:?}");
-    assert!(all > 100 && holes * 2 < all, "{holes} of {all} are stereo holes");
-    assert!(usable * 10 > all, "{usable} of {all} are usable");
 }

@@ -18,6 +18,8 @@ pub enum Aspect {
     Data,
     /// Whether there is a range.
     Range,
+    /// The score of point stereo, where the ranges are of point stereo.
+    StereoScore,
     /// The nearest depth edge.
     DepthEdge,
     /// Pixels at full scale.
@@ -63,11 +65,12 @@ pub struct Criterion {
 
 impl Aspect {
     /// All of them.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::Refused,
         Self::Rim,
         Self::Data,
         Self::Range,
+        Self::StereoScore,
         Self::DepthEdge,
         Self::Saturation,
         Self::Contrast,
@@ -87,6 +90,7 @@ impl Aspect {
             Self::Rim => "distance from the rim",
             Self::Data => "pixels without data",
             Self::Range => "range",
+            Self::StereoScore => "stereo score",
             Self::DepthEdge => "distance from a depth edge",
             Self::Saturation => "overexposed share",
             Self::Contrast => "contrast",
@@ -122,7 +126,7 @@ impl Aspect {
 
     /// Whether larger values are better.
     pub const fn at_least(self) -> bool {
-        matches!(self, Self::Rim | Self::DepthEdge | Self::Contrast)
+        matches!(self, Self::Rim | Self::StereoScore | Self::DepthEdge | Self::Contrast)
     }
 
     /// Where its limit comes from.
@@ -138,6 +142,7 @@ impl Aspect {
             | Self::Texture
             | Self::Likeness => "ours",
             Self::Range => "Kim09 §3, Deans05 §2",
+            Self::StereoScore => "Kim09 §4.6",
             Self::RangeError => "Kim09 Eq. 1",
             Self::DepthEdge | Self::Relief => "Kim09 §5.2",
             Self::Slant => "ours; Kim09 §3",
@@ -156,6 +161,9 @@ impl Aspect {
             Self::Rim => format!("{v:.0} px from the image’s rim: a step may carry it out"),
             Self::Data => "pixels without data in the window".to_owned(),
             Self::Range => format!("no range: stereo hole ({})", hole(v)),
+            Self::StereoScore => {
+                format!("stereo score {v:.2} is below the tracker’s limit: it would be lost")
+            }
             Self::RangeError => format!("far off: the range is known to {percent:.0} % only"),
             Self::DepthEdge => format!("depth edge {v:.0} px away"),
             Self::Relief => format!("deep relief in the window: {percent:.0} % of the distance"),

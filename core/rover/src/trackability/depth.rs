@@ -17,7 +17,7 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Vector3};
 
 use super::limits::TrackabilityLimits;
-use super::point_ranges::{PointRanges, SPACING_PX};
+use super::point_ranges::{PointRanges, SPACING_PX, node_of};
 use sightline_geometry::camera::Camera;
 use sightline_geometry::frames::{Pixel, Point3};
 use sightline_track::locate::shape_tracker::surface::StopSurface;
@@ -190,19 +190,20 @@ impl Ranges<'_> {
                 let ray = self.left.ray(pixel)?;
                 surface.alignment.left.project(&ray.at(ALONG_M))?
             }
-            Surface::Points(_) => {
-                let spacing_px = f64::from(SPACING_PX);
-                Pixel::new(pixel.x / spacing_px, pixel.y / spacing_px)
-            }
+            Surface::Points(_) => node_of(pixel),
         };
         let map = self.surface.map();
         seen.is_inside(map.width, map.height).then(|| [seen.x.round() as u32, seen.y.round() as u32])
     }
 
-    /// The point under an aligned pixel, or the middle one of its nearest neighbours.
+    /// The point under an aligned pixel, or the middle one of its nearest neighbours; of a grid the node alone.
     pub(super) fn point(&self, [x, y]: [u32; 2]) -> Option<Point3> {
         if let Some(point) = self.at(i64::from(x), i64::from(y)) {
             return Some(point);
+        }
+        // The neighbours of a node are as far away as the window reaches.
+        if self.surface.spacing_px() > 1 {
+            return None;
         }
         let around = (-NEAR_PX..=NEAR_PX).flat_map(|v| (-NEAR_PX..=NEAR_PX).map(move |u| (u, v)));
         let mut near: Vec<Point3> = around
@@ -219,6 +220,13 @@ impl Ranges<'_> {
     pub(super) fn outcome(&self, [x, y]: [u32; 2]) -> Outcome {
         let map = self.surface.map();
         map.outcome.get((y * map.width + x) as usize).copied().unwrap_or(Outcome::Outside)
+    }
+
+    /// The score of point stereo; `None` for dense stereo.
+    pub(super) fn stereo_score(&self, [x, y]: [u32; 2]) -> Option<f64> {
+        let Surface::Points(points) = self.surface else { return None };
+        let score = points.scores.get((y * points.nodes.width + x) as usize)?;
+        score.is_finite().then(|| f64::from(*score))
     }
 
     /// The distance of a point from the left camera, m.

@@ -270,6 +270,9 @@ impl Ground {
         let error = self.range_error(pixel, range_m);
         // What stereo errs by looks like relief; far away it is most of it.
         let noise = error.unwrap_or(0.0);
+        if let score @ Some(_) = ranges.stereo_score(at) {
+            criteria.push(Measured::new(Aspect::StereoScore, score, None, Some(limits.stereo_ncc_min)));
+        }
         criteria.extend([
             Measured::new(Aspect::RangeError, error, Some(own.range_error_risky), Some(own.range_error_bad)),
             Measured::new(Aspect::Relief, window.departure, Some(limits.warn_boundary + noise), None),

@@ -10,6 +10,7 @@
 //! | `rim` | from the pixel to the image's rim | px | half a window and what a step of 10 % moves it | half a window | ours |
 //! | `data` | pixels of the window without data | share | – | any | R66 |
 //! | `range` | dense stereo's outcome | – | – | a hole | R19, R187 |
+//! | `stereo_score` | correlation of point stereo, on convergent pairs | – | – | `stereo_ncc_min` | R82 |
 //! | `range_error` | 3σ of the range over the range: `R Δd/(f B)` | share | `range_error_risky` | `range_error_bad` | K-Eq 1, R35 |
 //! | `depth_edge` | to the nearest jump of the disparity | px | `edge_risky_focus` · `focus_px` | `edge_bad_px` | R119, ours |
 //! | `relief` | largest departure of the ranges from a plane, over the range | share | `warn_boundary` + `range_error` | – | R119 |

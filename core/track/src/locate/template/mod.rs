@@ -26,6 +26,7 @@ pub mod stereo_curve;
 mod stereo_input;
 mod stereo_search;
 pub mod point_stereo;
+pub mod point_match;
 pub mod triangulate;
 mod relief;
 pub mod warnings;

@@ -143,7 +143,7 @@ pub fn point_stereo(
 }
 
 /// The whole epipolar curve, or the image row in its place.
-fn curve(input: &StereoInput<'_>, settings: &TemplateSettings) -> Option<Curve> {
+pub(super) fn curve(input: &StereoInput<'_>, settings: &TemplateSettings) -> Option<Curve> {
     let mut curve = Curve::new(&curve_input(input, settings))?;
     if settings.stereo_reference == StereoReference::ImageRow {
         curve.flatten_to_row(input.left_pixel.y);
@@ -161,7 +161,7 @@ fn curve_input<'a>(input: &StereoInput<'a>, settings: &TemplateSettings) -> Curv
 }
 
 /// The part of the curve to search: first and last arc length, px.
-fn search_interval(
+pub(super) fn search_interval(
     curve: &Curve,
     input: &StereoInput<'_>,
     settings: &TemplateSettings,
@@ -248,15 +248,15 @@ fn surface_slope(
 }
 
 /// A point of the right image and the surface there.
-struct Found {
-    right_pixel: Pixel,
-    range_m: f64,
-    right_from_left: Matrix2<f64>,
+pub(super) struct Found {
+    pub(super) right_pixel: Pixel,
+    pub(super) range_m: f64,
+    pub(super) right_from_left: Matrix2<f64>,
 }
 
 /// The left pixel to which the right one leads back, searched as the right one was, with the eyes exchanged; `None`
 /// where there is nothing to compare.
-fn left_again(
+pub(super) fn left_again(
     input: &StereoInput<'_>,
     found: &Found,
     focus: &Focus,
