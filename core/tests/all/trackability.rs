@@ -205,3 +205,36 @@ fn where_nothing_is_seen_everything_is_bad_and_there_is_no_good_pixel() {
     assert!(Ground::new(&world, 0, &Settings::default(), &limits).is_err());
     assert!(matches!(Ground::new(&world, 7, &Settings::default(), &limits), Err(Error::Target(_))));
 }
+
+#[test]
+fn the_expected_match_sigma_is_the_scatter_under_white_noise() {
+    const SIGMA: f64 = 0.03;
+    let mut state = 7_u64;
+    let mut uniform = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    let mut noisy = |side: u32| {
+        GrayImage::from_fn(side, side, |x, y| {
+            // Twelve uniform numbers are nearly Gaussian with variance 1.
+            let noise = (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
+            let (u, v) = (f64::from(x) - f64::from(side / 2), f64::from(y) - f64::from(side / 2));
+            Luma([(0.5 + 0.1 * (0.7 * u).sin() * (0.6 * v + 0.3).cos() + SIGMA * noise) as f32])
+        })
+    };
+    let focus = Focus::new(21, 4.0);
+    let (mut offsets, mut expected) = (Vec::new(), 0.0);
+    for _ in 0..200 {
+        let (template, image) = (Patch::from(noisy(21)), noisy(41));
+        let window_at = |x: i32, y: i32| {
+            let centre = Pixel::new(20.0 + f64::from(x), 20.0 + f64::from(y));
+            Some(patch::extract(&image, centre, 10, Kernel::Bicubic))
+        };
+        offsets.extend(focus.climb(&template, true, window_at).map(|found| found.offset_px));
+        expected += texture::match_sigma_px(&template, SIGMA, 1.0, &focus).unwrap() / 200.0;
+    }
+    let variance = |axis: usize| offsets.iter().map(|o| o[axis].powi(2)).sum::<f64>() / offsets.len() as f64;
+    let scatter = variance(0).max(variance(1)).sqrt();
+    println!("{} matches scatter by {scatter:.3} px, {expected:.3} px expected", offsets.len());
+    assert!(offsets.len() > 190 && (0.5..2.0).contains(&(expected / scatter)), "{expected} of {scatter}");
+}

@@ -3,7 +3,7 @@
 //! **Expected match.** Two windows that show the same but for noise (2σ_n²) and what a step changes ((1 − ρ²) s²) are
 //! matched by least squares through the Gaussian window w of the refinement:
 //! ```text
-//! A = Σ w g gᵀ,  B = Σ w² g gᵀ,  Σ = (2σ_n² + (1 − ρ²) s²) k A⁻¹ B A⁻¹,     σ = √(largest eigenvalue)
+//! A = Σ w g gᵀ,  B = Σ w² g gᵀ,  Σ = (2σ_n² + k (1 − ρ²) s²) A⁻¹ B A⁻¹,     σ = √(largest eigenvalue)
 //! ```
 //! The smaller eigenvalue of A (Shi & Tomasi 1994) is what makes it large: an edge, along which a window slides.
 //!
@@ -16,7 +16,7 @@
 //! | σ_n | `noise` | full scale |
 //! | s | standard deviation of the window | full scale |
 //! | ρ | `step_score` | – |
-//! | k | `ALIKE`: neighbours whose residuals are alike | – |
+//! | k | `ALIKE`: neighbours that a step changes alike | – |
 
 use nalgebra::{Matrix2, Vector2};
 
@@ -28,7 +28,7 @@ use sightline_vision::correlate::zncc::zncc_surface;
 use sightline_vision::image::patch::Patch;
 use sightline_vision::image::{GrayImage, PixelRect, gradient};
 
-/// Neighbours whose residuals are alike: three by three.
+/// Neighbours that a step changes alike: three by three.
 const ALIKE: f64 = 9.0;
 
 /// The sensor's noise, 1σ, fraction of full scale; 0 for an image too small to tell.
@@ -56,7 +56,9 @@ pub fn noise(image: &GrayImage) -> f64 {
 /// The expected 1σ of a match along the worst direction, px; `None` without any gradient in one direction.
 pub fn match_sigma_px(window: &Patch, noise: f64, step_score: f64, focus: &Focus) -> Option<f64> {
     let deviation = window.std()?;
-    let residual = 2.0 * noise * noise + (1.0 - step_score * step_score) * deviation * deviation;
+    // Noise is independent from pixel to pixel; changes of the scene are not.
+    let changed = (1.0 - step_score * step_score) * deviation * deviation;
+    let residual = 2.0 * noise * noise + ALIKE * changed;
     let (gx, gy) = gradient::central(window);
     let (mut a, mut b) = (Matrix2::zeros(), Matrix2::zeros());
     for ((gx, gy), weight) in gx.iter().zip(gy.iter()).zip(focus.weights()) {
@@ -68,7 +70,7 @@ pub fn match_sigma_px(window: &Patch, noise: f64, step_score: f64, focus: &Focus
         }
     }
     let inverse: Matrix2<f64> = a.try_inverse()?;
-    let covariance = inverse * b * inverse * (residual * ALIKE);
+    let covariance = inverse * b * inverse * residual;
     let largest = (covariance + covariance.transpose()).symmetric_eigenvalues().max() / 2.0;
     (largest.is_finite() && largest >= 0.0).then(|| largest.sqrt())
 }
