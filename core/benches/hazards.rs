@@ -105,9 +105,7 @@ fn pair_to_points(bencher: Bencher<'_, '_>) {
     let pair = stops.further_pair(0, scene.name).expect("a pair");
     let images = stops.capture_further(0, scene.name, Cancel::default()).expect("images");
     let images = [&*images.left, &*images.right];
-    bencher.bench_local(|| {
-        range_points(images, [pair.left, pair.right], &scene.settings, Cancel::default())
-    });
+    bencher.bench_local(|| range_points(images, [pair.left, pair.right], &scene.settings, Cancel::default()));
 }
 
 /// Points to the goodness map, on one thread.
@@ -117,9 +115,7 @@ fn points_to_goodness_one_thread(bencher: Bencher<'_, '_>) {
     let (points, pose) = (scene.points(), scene.world.traverse().site_from_rover(0));
     let before = scene.hazards(&points, None);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
-    bencher.bench_local(|| {
-        pool.install(|| scene.goodness(&scene.hazards(&points, Some(&before)), &pose))
-    });
+    bencher.bench_local(|| pool.install(|| scene.goodness(&scene.hazards(&points, Some(&before)), &pose)));
 }
 
 /// A path on that map.
@@ -148,11 +144,5 @@ fn counterfactual_of_a_blocked_rover(bencher: Bencher<'_, '_>) {
 }
 
 fn input<'a>(map: &'a GoodnessMap, pose: &'a Pose) -> PathInput<'a> {
-    PathInput {
-        goal_m: [6.0, 1.0],
-        step_m: 0.6,
-        curvature_per_m: 0.0,
-        map: Some(map),
-        site_from_rover: pose,
-    }
+    PathInput { goal_m: [6.0, 1.0], step_m: 0.6, curvature_per_m: 0.0, map: Some(map), site_from_rover: pose }
 }

@@ -14,6 +14,7 @@ use sightline_recordings::DrivenTraverse;
 use sightline_rover::driving::{DriveCommand, HazardMaps, OdometryPair, executive, odometry};
 use sightline_rover::pipeline::Stops;
 use sightline_session::driving::{self, DriveView, Steering};
+use sightline_session::hazard_view::HazardView;
 use sightline_session::step::RunStep;
 use sightline_track::cycle_stage::CycleStage;
 use sightline_track::locate::store::Cache;
@@ -25,6 +26,7 @@ use crate::identity::Identity;
 use crate::jobs::lock;
 use crate::live_session::LiveSession;
 use crate::naming::slug;
+use crate::problem::{ApiError, ApiResult};
 use crate::rendering::OpenTraverse;
 use crate::shared_world::SharedWorld;
 
@@ -278,6 +280,36 @@ pub(crate) fn view(live: &LiveSession) -> DriveView {
     // Never cancelled.
     let _mapped = map_hazards(&open, &steering.command, run.whole_steps(), &mut maps, Cancel::default());
     driven.with(|world| DriveView::of(world, steering, &run, &mut maps, is_driving))
+}
+
+/// The goodness map at a stop of the drive of a session.
+///
+/// # Errors
+/// A problem for a session without a drive, a navigator without a map, and a step that the drive has not come to.
+pub(crate) fn hazards(live: &LiveSession, step: usize, cancel: &CancelFlag) -> ApiResult<HazardView> {
+    let open = live.traverse();
+    let steering = live.with(|session| session.steering.clone());
+    let (Some(steering), Some(driven)) = (steering, &open.driven) else {
+        return Err(ApiError::conflict("The drive of this session is not on commands."));
+    };
+    let (command, navigator) = (&steering.command, steering.command.navigator);
+    if !navigator.needs_map() {
+        let problem = format!("The navigator `{}` uses no hazard map.", navigator.name());
+        return Err(ApiError::conflict(problem).hint("Choose `gestalt` or `morphin` in the command."));
+    }
+    let run = live.with(|session| session.run(steering.target, steering.run).cloned())?;
+    let steps = run.whole_steps();
+    let (Some(first), Some(last)) = (steps.first(), steps.iter().find(|known| known.step == step)) else {
+        return Err(ApiError::not_found(format!("The drive has not come to step {step}.")));
+    };
+    let found = lock(&driven.maps).at(
+        &open.traverse,
+        command,
+        [&first.trace, &last.trace],
+        cancel.as_ref().into(),
+    )?;
+    let none = || ApiError::not_found(format!("Step {step} has no hazard map, because its pair is missing."));
+    found.map(|hazards| HazardView::of(&hazards)).ok_or_else(none)
 }
 
 /// Puts the drive with a stop more in the place of the former one in the list of open drives.

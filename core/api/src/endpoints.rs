@@ -12,6 +12,7 @@ use sightline_session::documents::Document;
 use sightline_session::driving::{DriveView, Steering};
 use sightline_session::exports::ExportEntry;
 use sightline_session::expression::complete::Completion;
+use sightline_session::hazard_view::HazardView;
 use sightline_session::metrics::RunMetrics;
 use sightline_session::notes::{EditNote, NewNote, Note};
 use sightline_session::query::{CompletionQuery, Language, Query, QueryAnswer};
@@ -28,8 +29,8 @@ use sightline_track::locate::template::history::AgainstEarlier;
 use crate::endpoint::{Done, Endpoint, File, Method, NoBody, NoQuery};
 use crate::event::Event;
 use crate::location::{
-    Anywhere, AtBreakpoint, AtDocument, AtExport, AtImage, AtImport, AtNote, AtRun, AtSession, AtStep,
-    AtStop, AtStudyJob, AtTarget, AtTraverse, AtUpload, AtViewerFile,
+    Anywhere, AtBreakpoint, AtDocument, AtDriveStop, AtExport, AtImage, AtImport, AtNote, AtRun, AtSession,
+    AtStep, AtStop, AtStudyJob, AtTarget, AtTraverse, AtUpload, AtViewerFile,
 };
 use crate::program::{Health, Version};
 use crate::query::{FirstRow, FirstStop, ImageWish, MapLimits, MapPixel, SessionPart, ValueName};
@@ -160,6 +161,8 @@ endpoints! {
     ShowDrive: Get "/sessions/{session}/drive", AtSession => DriveView;
     /// Lets a run drive, or changes its command.
     SteerDrive: Put "/sessions/{session}/drive", AtSession, body Steering => DriveView;
+    /// The goodness map at a stop of the drive of a session.
+    ShowHazards: Get "/sessions/{session}/drive/steps/{step}/hazards", AtDriveStop => HazardView;
     /// Opens the live Rerun stream of a session.
     StreamRecording: Post "/sessions/{session}/rerun", AtSession => RerunStream;
     /// Closes the live Rerun stream of a session.

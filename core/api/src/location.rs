@@ -62,6 +62,16 @@ pub struct AtSession {
     pub session: String,
 }
 
+/// A stop of the drive of a session.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, IntoParams)]
+#[into_params(parameter_in = Path)]
+pub struct AtDriveStop {
+    /// The session's id.
+    pub session: String,
+    /// The stop's index.
+    pub step: usize,
+}
+
 /// A file that a session can be exported as.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, IntoParams)]
 #[into_params(parameter_in = Path)]

@@ -20,6 +20,7 @@ pub mod records;
 pub mod marks;
 pub mod track;
 pub mod driving;
+pub mod hazard_view;
 pub mod pause;
 pub mod view;
 pub mod photometry;

@@ -10,11 +10,12 @@ use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 use sightline_api::endpoint::Endpoint;
-use sightline_api::endpoints::{BeginDrive, ShowDrive, ShowSession, SteerDrive};
-use sightline_api::location::AtSession;
+use sightline_api::endpoints::{BeginDrive, ShowDrive, ShowHazards, ShowSession, SteerDrive};
+use sightline_api::location::{AtDriveStop, AtSession};
 use sightline_api::wire::NewDrive;
 use sightline_recordings::DrivenTraverse;
 use sightline_session::driving::{DriveView, Steering};
+use sightline_session::hazard_view::HazardView;
 use sightline_session::view::{SavedSession, SavedTarget, SessionView};
 use sightline_session::{Cursor, Fork, Session};
 use utoipa_axum::router::OpenApiRouter;
@@ -23,7 +24,7 @@ use utoipa_axum::routes;
 use crate::cancel::CancelFlag;
 use crate::driven;
 use crate::drives::scenario_of;
-use crate::extract::{Body, RunPath, SessionPath};
+use crate::extract::{Body, Path, RunPath, SessionPath};
 use crate::jobs::blocking;
 use crate::live_session::LiveSession;
 use crate::problem::{ApiError, ApiResult};
@@ -38,6 +39,7 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
         .routes(route::<BeginDrive>(routes!(begin)))
         .routes(route::<ShowDrive>(routes!(show)))
         .routes(route::<SteerDrive>(routes!(steer)))
+        .routes(route::<ShowHazards>(routes!(hazards)))
 }
 
 /// Begins a drive on commands with a run
@@ -63,6 +65,19 @@ async fn begin(
 #[utoipa::path(get, operation_id = "show_drive", path = ShowDrive::PATH, tag = "drive", responses((status = 200, body = DriveView), ApiError))]
 async fn show(SessionPath(live): SessionPath) -> ApiResult<Json<DriveView>> {
     blocking(move || Ok(Json(driven::view(&live)))).await
+}
+
+/// The goodness map at a stop of the drive of a session
+///
+/// The map on which the navigator chose the path there, from the stereo pairs of the stops up to it.
+#[utoipa::path(get, operation_id = "show_hazards", path = ShowHazards::PATH, tag = "drive", responses((status = 200, body = HazardView), ApiError))]
+async fn hazards(
+    State(state): State<AppState>,
+    Path(AtDriveStop { session, step }): Path<ShowHazards>,
+) -> ApiResult<Json<HazardView>> {
+    let live = state.session(&session)?;
+    let work = move |cancel: &CancelFlag| Ok(Json(driven::hazards(&live, step, cancel)?));
+    state.tries().run_until_dropped(work).await
 }
 
 /// Lets a run drive, or changes its command

@@ -19,6 +19,7 @@ use sightline_track::trace::ArrayName;
 
 pub(crate) use self::names::{Eye, Key, StepKey};
 use crate::drawing::raster::Raster;
+use crate::driving::hazards::HazardRaster;
 use crate::tables::Table;
 
 /// Memory that loaded things may take, bytes.
@@ -37,6 +38,8 @@ pub enum Item {
     Stop(Arc<StopDetail>),
     /// Of [`Key::Odometry`].
     Odometry(Arc<StopOdometry>),
+    /// Of [`Key::Hazards`].
+    Hazards(Arc<HazardRaster>),
     /// Of [`Key::Trace`].
     Trace(Arc<RunStep>),
     /// Of [`Key::Image`] and of a [`Key::Array`] that is a picture.
@@ -57,7 +60,7 @@ impl Item {
             Self::Raster(raster) => vec![raster.as_ref()],
             Self::Arrays(all) => all.values().flat_map(Self::rasters).collect(),
             Self::Stop(_) | Self::Odometry(_) | Self::Trace(_) | Self::Table(_) => Vec::new(),
-            Self::EarlierTemplates(_) | Self::Times(_) => Vec::new(),
+            Self::EarlierTemplates(_) | Self::Times(_) | Self::Hazards(_) => Vec::new(),
         }
     }
 
@@ -65,6 +68,7 @@ impl Item {
         match self {
             Self::Stop(_) => size_of::<StopDetail>(),
             Self::Odometry(odometry) => size_of::<StopOdometry>() + size_of_val(odometry.corners.as_slice()),
+            Self::Hazards(raster) => raster.bytes(),
             Self::Trace(_) => TRACE_BYTES,
             Self::Raster(raster) => raster.bytes(),
             Self::Table(table) => table.bytes(),
@@ -226,6 +230,14 @@ impl Cache {
     pub(crate) fn odometry(&self, key: &Key) -> Slot<'_, StopOdometry> {
         self.slot(key).and(|item| match item {
             Item::Odometry(odometry) => Some(odometry.as_ref()),
+            _ => None,
+        })
+    }
+
+    /// The goodness map of a stop.
+    pub(crate) fn hazards(&self, key: &Key) -> Slot<'_, HazardRaster> {
+        self.slot(key).and(|item| match item {
+            Item::Hazards(raster) => Some(raster.as_ref()),
             _ => None,
         })
     }

@@ -51,6 +51,13 @@ pub enum Key {
         /// The stop.
         step: usize,
     },
+    /// The goodness map of a stop of a drive.
+    Hazards {
+        /// The session.
+        session: String,
+        /// The stop.
+        step: usize,
+    },
     /// What a step saw and decided.
     Trace(StepKey),
     /// An array of a step.

@@ -13,10 +13,12 @@ use crate::theme;
 /// Points along a planned arc.
 const SAMPLES: usize = 24;
 
-/// Draws goal, tolerance and planned path of the cursor's stop.
+/// Draws goodness map, paths, goal, tolerance and planned path of the cursor's stop.
 pub(crate) fn paint(plot: &mut PlotUi<'_>, state: &State) {
+    super::hazards::paint(plot, state);
     paint_wheels(plot, state);
     let (Some(cycle), Some(stop)) = (state.cycle_at(state.cursor.step), state.stop()) else { return };
+    super::paths::paint(plot, state, &stop.site_from_rover.to_pose());
     let [north, east] = cycle.goal.in_site_m;
     let tolerance_m =
         state.drive().and_then(|drive| drive.steering.as_ref()).map_or(0.0, |s| s.command.tolerance_m);
@@ -28,7 +30,7 @@ pub(crate) fn paint(plot: &mut PlotUi<'_>, state: &State) {
     let goal = Points::new("goal", vec![[east, north]]).color(theme::accent()).radius(5.0);
     plot.points(goal.shape(MarkerShape::Cross));
     if let Some(motion @ Motion::Arc { .. }) = &cycle.motion {
-        let path = arc(&stop.site_from_rover.to_pose(), motion);
+        let path = path(&stop.site_from_rover.to_pose(), motion);
         plot.line(
             Line::new("planned", path).color(theme::accent()).style(LineStyle::dashed_dense()).width(1.5),
         );
@@ -72,7 +74,7 @@ fn at(place: &Reckoned) -> [f64; 2] {
 }
 
 /// Points along a motion of the rover, east and north, m.
-fn arc(site_from_rover: &Pose, motion: &Motion) -> Vec<[f64; 2]> {
+pub(super) fn path(site_from_rover: &Pose, motion: &Motion) -> Vec<[f64; 2]> {
     let after = |k: usize| {
         let ([ahead_m, right_m], _) = motion.after(k as f64 / SAMPLES as f64);
         site_from_rover * Point3::new(ahead_m, right_m, 0.0)
@@ -87,10 +89,10 @@ mod tests {
     #[test]
     fn a_planned_arc_turns_to_the_side_of_its_curvature() {
         let motion = |length_m, curvature_per_m| Motion::Arc { length_m, curvature_per_m };
-        let quarter = arc(&Pose::identity(), &motion(std::f64::consts::FRAC_PI_2, 1.0));
+        let quarter = path(&Pose::identity(), &motion(std::f64::consts::FRAC_PI_2, 1.0));
         let [east, north] = quarter[SAMPLES];
         assert!((east - 1.0).abs() < 1e-12 && (north - 1.0).abs() < 1e-12);
-        assert_eq!(arc(&Pose::identity(), &motion(2.0, 0.0))[SAMPLES], [0.0, 2.0]);
+        assert_eq!(path(&Pose::identity(), &motion(2.0, 0.0))[SAMPLES], [0.0, 2.0]);
     }
 
     #[test]

@@ -1,7 +1,9 @@
 //! Driving on commands: the form of the command, the drive as the server has it, and the panel that shows both.
 
+pub(crate) mod hazards;
 pub(crate) mod map;
 pub(crate) mod panel;
+pub(crate) mod paths;
 pub(crate) mod pause;
 pub(crate) mod stages;
 pub(crate) mod update;

@@ -2,7 +2,7 @@
 
 use egui::{Button, CollapsingHeader, ComboBox, DragValue, Grid, Label, Response, RichText, ScrollArea, Ui};
 use sightline_rover::driving::{
-    ArrivalAction, DriveCommand, GoalRule, OdometryPair, StopReason, TrackedStops,
+    ArrivalAction, DriveCommand, GoalRule, NavigatorKind, OdometryPair, StopReason, TrackedStops,
 };
 use sightline_rover::visual_odometry::{OdometryMode, OdometryPreset};
 use sightline_session::driving::DriveView;
@@ -88,6 +88,10 @@ fn form(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         choice(ui, "goal", 150.0, rules, &mut command.goal, rule);
         let modes = [OdometryMode::Off, OdometryMode::SlipCheck, OdometryMode::Full];
         choice(ui, "visual odometry", 160.0, modes, &mut command.odometry, words::odometry);
+        let navigators = [NavigatorKind::Arcs, NavigatorKind::Gestalt, NavigatorKind::Morphin];
+        let help = "What chooses the motions. Avoiding hazards needs a pair of hazcams at every stop.";
+        let shown = choice(ui, "navigator", 170.0, navigators, &mut command.navigator, words::navigator);
+        shown.on_hover_text(help);
     });
     CollapsingHeader::new(theme::label("tracked stops, odometry, offset, limits"))
         .id_salt("drive limits")
@@ -132,6 +136,8 @@ fn limits(ui: &mut Ui, command: &mut DriveCommand) {
             command.slip_max = percent / 100.0;
         }
         number(ui, "tilt", "°", &mut command.tilt_max_deg, (1.0, 45.0), "Largest tilt after a step");
+        let help = "Hazards nearer to the target than this are ignored, so that a large rock can be approached";
+        number(ui, "exemption", " m", &mut command.exemption_radius_m, (0.0, 5.0), help);
         number(ui, "time", " min", &mut command.flight_minutes_max, (1.0, 10_000.0), "Time on Mars");
     });
 }
@@ -252,7 +258,7 @@ fn buttons(ui: &mut Ui, state: &State, drive: &DriveView, out: &mut Vec<Command>
 
 /// Where the drive stands.
 fn standing(ui: &mut Ui, drive: &DriveView) {
-    let ending = drive.cycles.last().and_then(|cycle| cycle.ending);
+    let ending = drive.cycles.last().and_then(|cycle| cycle.ending.as_ref());
     let (text, colour) = match (ending, drive.is_driving, drive.paused) {
         (Some(ending), ..) => (words::ending(&ending), theme::verdict(ending.reason == StopReason::Arrived)),
         (None, true, _) => ("drives".to_owned(), theme::text()),

@@ -109,7 +109,9 @@ impl State {
                 self.cache.forget(|kept| match kept {
                     Key::Trace(kept) | Key::Array(kept, _) | Key::Arrays(kept) => *kept == key,
                     Key::EarlierTemplates(kept) | Key::Times(kept) => *kept == key,
-                    Key::Image { .. } | Key::Stop { .. } | Key::Odometry { .. } => false,
+                    Key::Image { .. } | Key::Stop { .. } | Key::Odometry { .. } | Key::Hazards { .. } => {
+                        false
+                    }
                 });
             }
         }

@@ -4,7 +4,7 @@ use egui::{Grid, Label, ScrollArea, Ui};
 use sightline_rover::driving::{Cycle, Motion};
 
 use crate::command::Stage;
-use crate::driving::{pause, words};
+use crate::driving::{paths, pause, words};
 use crate::panels::{self, digits};
 use crate::state::{State, run_letter};
 use crate::theme;
@@ -27,6 +27,11 @@ pub(crate) fn show(ui: &mut Ui, state: &State) {
                 ui.end_row();
             }
         });
+        if let Some(choice) = state.cycle_at(step).and_then(|cycle| cycle.choice.as_ref())
+            && stage == Stage::SELECT_PATH
+        {
+            paths::table(ui, choice);
+        }
         let driver = state.drive().and_then(|drive| drive.steering.as_ref());
         if let Some(driver) = driver.filter(|driver| driver.run != state.cursor.run) {
             let sentence = format!("Driven by the estimates of run {}.", run_letter(driver.run));
@@ -42,7 +47,7 @@ fn missing(state: &State, stage: Stage) -> String {
         return pause::not_computed(before);
     }
     match state.cycle_at(step) {
-        Some(cycle) if stage == Stage::DRIVE => match (cycle.ending, cycle.motion) {
+        Some(cycle) if stage == Stage::DRIVE => match (cycle.ending.as_ref(), cycle.motion) {
             (Some(ending), _) => format!("The rover did not drive from here: {}.", words::ending(&ending)),
             (None, None) => "The rover stays here for another pair of images.".to_owned(),
             (None, Some(_)) => "The rover has not driven from here yet.".to_owned(),

@@ -33,7 +33,7 @@ impl State {
     /// How the drive stands, in a word; `None` where nobody drives.
     pub(crate) fn drive_word(&self) -> Option<&'static str> {
         let drive = self.drive()?;
-        Some(match drive.cycles.last().and_then(|cycle| cycle.ending) {
+        Some(match drive.cycles.last().and_then(|cycle| cycle.ending.as_ref()) {
             Some(ending) => words::reason(ending.reason),
             None if drive.is_driving => "drives",
             None => "waits",

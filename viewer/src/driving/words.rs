@@ -1,6 +1,9 @@
 //! Motions, ends and outcomes in words.
 
-use sightline_rover::driving::{Cycle, Ending, Motion, OdometryPair, StopReason, TrackedStops};
+use sightline_rover::driving::{
+    Cycle, Ending, Motion, NavigatorKind, OdometryPair, StopReason, TrackedStops, Veto,
+};
+use sightline_rover::hazards::HazardTerm;
 use sightline_rover::visual_odometry::{MeasuredMotion, OdometryMode, OdometryPreset};
 use sightline_session::driving::DriveSummary;
 
@@ -39,6 +42,37 @@ pub(super) fn reason(reason: StopReason) -> &'static str {
         StopReason::NoSafePath => "no safe path",
         StopReason::NoRangeData => "no range data",
     }
+}
+
+/// What chooses the motions.
+pub(super) fn navigator(navigator: NavigatorKind) -> &'static str {
+    match navigator {
+        NavigatorKind::Arcs => "no hazard avoidance",
+        NavigatorKind::Gestalt => "avoids hazards as gestalt",
+        NavigatorKind::Morphin => "avoids hazards as morphin",
+    }
+}
+
+/// A term of the ground with its value.
+pub(super) fn term(term: HazardTerm, value: f64) -> String {
+    match term {
+        HazardTerm::Tilt => format!("tilt {}°", fixed(value, 1)),
+        HazardTerm::Roughness => format!("roughness {} cm", fixed(100.0 * value, 1)),
+        HazardTerm::Step => format!("step {} cm", fixed(100.0 * value, 1)),
+        HazardTerm::Unknown => format!("certainty {}", fixed(value, 2)),
+    }
+}
+
+/// Why a path must not be driven.
+pub(super) fn veto(veto: &Veto) -> String {
+    let (name, scale, unit, decimals) = match veto.term {
+        HazardTerm::Tilt => ("tilt", 1.0, "°", 1),
+        HazardTerm::Roughness => ("roughness", 100.0, " cm", 1),
+        HazardTerm::Step => ("step", 100.0, " cm", 1),
+        HazardTerm::Unknown => ("unknown ground", 100.0, " %", 0),
+    };
+    let [value, limit] = [veto.value, veto.limit].map(|value| fixed(scale * value, decimals));
+    format!("{name} {value}{unit} after {} m, limit {limit}{unit}", fixed(veto.along_m, 2))
 }
 
 /// What visual odometry is used for.
@@ -144,6 +178,13 @@ pub(super) fn report(cycle: &Cycle) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_veto_names_the_term_with_its_limit() {
+        let of = |term, value, limit| veto(&Veto { in_site_m: [0.0; 2], along_m: 0.6, term, value, limit });
+        assert_eq!(of(HazardTerm::Step, 0.25, 0.18), "step 25.0 cm after 0.60 m, limit 18.0 cm");
+        assert_eq!(of(HazardTerm::Unknown, 0.5, 0.3), "unknown ground 50 % after 0.60 m, limit 30 %");
+    }
 
     #[test]
     fn motions_and_ends_are_told_in_words() {

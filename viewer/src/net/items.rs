@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use sightline_api::endpoint::Call;
 use sightline_api::endpoints::{
-    ShowArrays, ShowEarlierTemplates, ShowImage, ShowStep, ShowStop, ShowStopOdometry, ShowTimes,
+    ShowArrays, ShowEarlierTemplates, ShowHazards, ShowImage, ShowStep, ShowStop, ShowStopOdometry, ShowTimes,
 };
-use sightline_api::location::{AtImage, AtStop};
+use sightline_api::location::{AtDriveStop, AtImage, AtStop};
 use sightline_api::query::ImageWish;
 use sightline_api::wire::Problem;
 use sightline_track::trace::ArrayName;
@@ -14,6 +14,7 @@ use sightline_vision::image::npz;
 
 use crate::cache::{Item, Key};
 use crate::drawing::raster::Raster;
+use crate::driving::hazards::HazardRaster;
 use crate::net::reply::{misread, parse};
 use crate::tables::Table;
 
@@ -29,6 +30,9 @@ pub(crate) fn call(key: &Key) -> Call {
         Key::Odometry { traverse, step } => {
             Call::to::<ShowStopOdometry>(&AtStop { id: traverse.clone(), step: *step })
         }
+        Key::Hazards { session, step } => {
+            Call::to::<ShowHazards>(&AtDriveStop { session: session.clone(), step: *step })
+        }
         Key::Trace(step) => Call::to::<ShowStep>(step),
         Key::Array(step, _) | Key::Arrays(step) => Call::to::<ShowArrays>(step),
         Key::EarlierTemplates(step) => Call::to::<ShowEarlierTemplates>(step),
@@ -41,6 +45,9 @@ pub(super) fn read(key: &Key, bytes: &[u8], context: &egui::Context) -> Result<I
     match key {
         Key::Stop { .. } => Ok(Item::Stop(Arc::new(parse::<ShowStop>(bytes)?))),
         Key::Odometry { .. } => Ok(Item::Odometry(Arc::new(parse::<ShowStopOdometry>(bytes)?))),
+        Key::Hazards { .. } => {
+            Ok(Item::Hazards(Arc::new(HazardRaster::new(context, parse::<ShowHazards>(bytes)?))))
+        }
         Key::EarlierTemplates(_) => Ok(Item::EarlierTemplates(parse::<ShowEarlierTemplates>(bytes)?)),
         Key::Times(_) => Ok(Item::Times(parse::<ShowTimes>(bytes)?)),
         Key::Trace(_) => Ok(Item::Trace(Arc::new(parse::<ShowStep>(bytes)?))),

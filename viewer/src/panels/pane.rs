@@ -62,6 +62,8 @@ pub enum Need {
     Studies,
     /// The corners of visual odometry.
     Odometry,
+    /// The goodness map of the current step.
+    Hazards,
 }
 
 /// Makes the enum of the panels from their table.

@@ -138,6 +138,8 @@ pub struct State {
     pub wants_history: bool,
     /// Whether a panel shows the corners of visual odometry.
     pub(crate) wants_odometry: bool,
+    /// Whether a panel on the screen shows the goodness map.
+    pub(crate) wants_hazards: bool,
     /// Layers of marks that are switched off.
     pub hidden: HashSet<Layer>,
     /// Whether marks are shown at all.
@@ -216,6 +218,7 @@ impl State {
             studies: Studies::default(),
             wants_history: false,
             wants_odometry: false,
+            wants_hazards: false,
             hidden: HashSet::from(Layer::HIDDEN_AT_FIRST),
             marks: true,
             looks: Looks::default(),

@@ -21,6 +21,7 @@ impl State {
         self.compare.wants_metrics = needs.contains(&Need::Metrics);
         self.wants_history = needs.contains(&Need::MatchedWindows);
         self.wants_odometry = needs.contains(&Need::Odometry);
+        self.wants_hazards = needs.contains(&Need::Hazards);
         self.want_tried_scores(needs.contains(&Need::TriedScores));
         if needs.contains(&Need::Explanation) {
             self.want_question();

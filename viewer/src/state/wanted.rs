@@ -27,6 +27,7 @@ impl State {
             }
         }
         self.want_odometry(&mut keys);
+        self.want_hazards(&mut keys);
         self.want_compared(&mut keys);
         // The record of the pick has the warnings about it.
         let pick = self.run().and_then(|run| run.rows.first()).map(|row| row.step);

@@ -133,11 +133,11 @@ fn no_part_is_blank_without_a_sentence_that_says_why() {
                 state
             });
             shown.says(
-                "at step 1: on the way the features are followed; the shape is asked at the last stop.",
+                "at step 1: features follow the target on the way; the surface is registered at the last stop.",
             );
         }
     }
-    part(Part::Meshes, 0).says("the surface of the designation is what later stops are registered to");
+    part(Part::Meshes, 0).says("later stops are registered to the surface at the designation");
     part(Part::Surface, 0).says("disparity, px");
     let refused = part(Part::Sensor, REFUSED);
     refused.says("Not used: the RMS residual of the surfaces is 2.6 times its predicted σ");

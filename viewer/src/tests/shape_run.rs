@@ -110,10 +110,10 @@ pub(crate) fn trace(tracker: TrackerKind, step: usize) -> RunStep {
 
 fn why(step: usize) -> String {
     let why = match step {
-        0 => "the surface of the designation is what later stops are registered to",
-        1 => "on the way the features are followed; the shape is asked at the last stop",
-        HAND_OFF => "other cameras take over here",
-        _ => "this is the last stop of these cameras",
+        0 => "later stops are registered to the surface at the designation",
+        1 => "features follow the target on the way; the surface is registered at the last stop",
+        HAND_OFF => "the target is handed over to other cameras here",
+        _ => "this is the last stop with these cameras",
     };
     why.to_owned()
 }

@@ -90,6 +90,14 @@ pub(crate) fn signed(value: f32, limit: f32) -> Color32 {
     ramp(colorous::RED_BLUE, 0.5 - f64::from(value / limit) / 2.0)
 }
 
+/// Red–yellow–green over the goodness of the ground, 0 to 100, half transparent; unknown ground has no colour.
+pub(crate) fn goodness(percent: i8) -> Color32 {
+    if percent < 0 {
+        return Color32::TRANSPARENT;
+    }
+    ramp(colorous::RED_YELLOW_GREEN, f64::from(percent) / 100.0).gamma_multiply(0.6)
+}
+
 /// How well a target would do.
 pub(crate) fn trackability(verdict: Verdict) -> Color32 {
     match verdict {

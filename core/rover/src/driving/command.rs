@@ -60,12 +60,12 @@ impl NavigatorKind {
     }
 
     /// Whether it needs a hazard map.
-    pub(super) fn needs_map(self) -> bool {
+    pub fn needs_map(self) -> bool {
         self != Self::Arcs
     }
 
     /// Its name in a command.
-    pub(super) fn name(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Arcs => "arcs",
             Self::Gestalt => "gestalt",

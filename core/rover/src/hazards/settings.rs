@@ -12,33 +12,33 @@ settings_group! {
     /// Settings of the hazard map.
     HazardSettings as "hazards" {
         /// Side of a cell. Smaller: rocks are sharper, and distant cells lack points.
-        cell_m: f64 = 0.10, "m", Domain::Between(0.05, 0.5), "ours; domain.md 8.2 has 0.20";
+        cell_m: f64 = 0.10, "m", Domain::Between(0.05, 0.5), "ours; Goldberg02 has 0.20";
         /// Side of the map, which wraps around the rover.
-        side_m: f64 = 16.0, "m", Domain::Between(4.0, 40.0), "ours; domain.md 8.2 has 10";
+        side_m: f64 = 16.0, "m", Domain::Between(4.0, 40.0), "ours; Goldberg02 has 10";
         /// Radius of the disc under which the ground is assessed: half the width over the wheels with a margin.
-        rover_radius_m: f64 = 0.8, "m", Domain::Between(0.2, 2.0), "domain.md 8.2";
+        rover_radius_m: f64 = 0.8, "m", Domain::Between(0.2, 2.0), "ours, after Goldberg02";
         /// Distance of two cells up to which the difference of their heights is a step.
-        step_reach_m: f64 = 0.4, "m", Domain::Between(0.1, 1.0), "domain.md 8.2";
+        step_reach_m: f64 = 0.4, "m", Domain::Between(0.1, 1.0), "ours, after Goldberg02";
         /// Tilt of the plane up to which it has full goodness.
-        tilt_ok_deg: f64 = 8.0, "deg", Domain::Between(0.0, 45.0), "domain.md 8.2";
+        tilt_ok_deg: f64 = 8.0, "deg", Domain::Between(0.0, 45.0), "ours, after Goldberg02";
         /// Tilt from which on the goodness is 0.
-        tilt_bad_deg: f64 = 25.0, "deg", Domain::Between(1.0, 60.0), "domain.md 8.2";
+        tilt_bad_deg: f64 = 25.0, "deg", Domain::Between(1.0, 60.0), "ours, after Goldberg02";
         /// RMS residual of the plane up to which it has full goodness.
-        roughness_ok_m: f64 = 0.04, "m", Domain::Between(0.0, 1.0), "domain.md 8.2";
+        roughness_ok_m: f64 = 0.04, "m", Domain::Between(0.0, 1.0), "ours, after Goldberg02";
         /// RMS residual from which on the goodness is 0.
-        roughness_bad_m: f64 = 0.10, "m", Domain::Between(0.001, 2.0), "domain.md 8.2";
+        roughness_bad_m: f64 = 0.10, "m", Domain::Between(0.001, 2.0), "ours, after Goldberg02";
         /// Step up to which it has full goodness.
-        step_ok_m: f64 = 0.08, "m", Domain::Between(0.0, 1.0), "domain.md 8.2";
+        step_ok_m: f64 = 0.08, "m", Domain::Between(0.0, 1.0), "ours, after Goldberg02";
         /// Step from which on the goodness is 0.
-        step_bad_m: f64 = 0.20, "m", Domain::Between(0.001, 2.0), "domain.md 8.2";
+        step_bad_m: f64 = 0.20, "m", Domain::Between(0.001, 2.0), "ours, after Goldberg02";
         /// Points in the disc from which on their number does not reduce the certainty.
-        points_full: f64 = 40.0, "", Domain::Between(3.0, 10_000.0), "domain.md 8.2";
+        points_full: f64 = 40.0, "", Domain::Between(3.0, 10_000.0), "ours, after Goldberg02";
         /// A cell is known if its decayed number of points is at least this.
         weight_min: f64 = 0.25, "", Domain::Between(0.001, 100.0), "ours";
         /// A cell of less certainty is unknown.
-        certainty_min: f64 = 0.3, "", Domain::Between(0.0, 1.0), "domain.md 8.2";
+        certainty_min: f64 = 0.3, "", Domain::Between(0.0, 1.0), "ours, after Goldberg02";
         /// Distance driven in which the number of points halves.
-        half_life_m: f64 = 5.0, "m", Domain::Between(0.1, 1000.0), "domain.md 8.2";
+        half_life_m: f64 = 5.0, "m", Domain::Between(0.1, 1000.0), "ours, after Goldberg02";
         /// Nearest range of the stereo pair.
         range_min_m: f64 = 0.4, "m", Domain::Between(0.1, 10.0), "ours";
         /// Points farther from the left camera are left out: their error is larger than the terms.
@@ -48,23 +48,23 @@ settings_group! {
         /// Share by which the best match must be better than any other.
         range_uniqueness_min: f64 = 0.15, "", Domain::Between(0.0, 1.0), "ours; docs/driving.md";
         /// Patches of fewer pixels are left out (blob filter).
-        range_speckle_px: u32 = 250, "px", Domain::Between(0.0, 100_000.0), "ours; domain.md 7: JPL 4 % of the image";
+        range_speckle_px: u32 = 250, "px", Domain::Between(0.0, 100_000.0), "ours; JPL: 4 % of the image";
         /// A stop of a drive whose pair gives fewer points has no range data.
         range_points_min: u32 = 200, "", Domain::Between(1.0, 100_000.0), "ours";
         /// Points nearer to the rover's axis along its length and …
-        own_half_length_m: f64 = 0.95, "m", Domain::Between(0.0, 3.0), "domain.md 5.4";
+        own_half_length_m: f64 = 0.95, "m", Domain::Between(0.0, 3.0), "ours: the body of MER";
         /// … across its width are left out: they are its own wheels and panels.
-        own_half_width_m: f64 = 1.2, "m", Domain::Between(0.0, 3.0), "domain.md 5.4";
+        own_half_width_m: f64 = 1.2, "m", Domain::Between(0.0, 3.0), "ours: the body of MER";
         /// Points higher above the rover's origin are left out: it passes below them, or they are false matches.
         height_max_m: f64 = 2.0, "m", Domain::Between(0.2, 20.0), "ours";
         /// Images wider than this are reduced before stereo.
-        range_width_px: u32 = 256, "px", Domain::Between(64.0, 2048.0), "R9; flown width";
+        range_width_px: u32 = 256, "px", Domain::Between(64.0, 2048.0), "Kim09 §3; flown width";
         /// Cells nearer to the target count as good (target exemption); 0: none.
-        exemption_radius_m: f64 = 0.0, "m", Domain::Between(0.0, 5.0), "R100; off";
+        exemption_radius_m: f64 = 0.0, "m", Domain::Between(0.0, 5.0), "Kim09 §6; off";
         /// Unknown cells nearer to the start count as good …
-        start_radius_m: f64 = 2.0, "m", Domain::Between(0.0, 10.0), "R102";
+        start_radius_m: f64 = 2.0, "m", Domain::Between(0.0, 10.0), "Kim09 §6";
         /// … until the rover is this far from the start: the first map has no data under the rover.
-        start_distance_m: f64 = 2.0, "m", Domain::Between(0.0, 10.0), "R102";
+        start_distance_m: f64 = 2.0, "m", Domain::Between(0.0, 10.0), "Kim09 §6";
     }
 }
 

@@ -22,37 +22,37 @@ settings_group! {
     /// Settings of the navigator on the goodness map.
     NavigatorSettings as "navigator" {
         /// Number of arcs, from the tightest to the left to the tightest to the right.
-        curvature_count: u32 = 23, "", Domain::OddBetween(3, 101), "domain.md 8.2";
+        curvature_count: u32 = 23, "", Domain::OddBetween(3, 101), "ours, after Goldberg02";
         /// Curvature of the tightest arc.
-        curvature_max_per_m: f64 = 1.0, "1/m", Domain::Between(0.05, 5.0), "domain.md 8.2";
+        curvature_max_per_m: f64 = 1.0, "1/m", Domain::Between(0.05, 5.0), "ours, after Goldberg02";
         /// Paths are evaluated over at least this length.
-        evaluated_min_m: f64 = 1.2, "m", Domain::Between(0.1, 5.0), "domain.md 8.2";
+        evaluated_min_m: f64 = 1.2, "m", Domain::Between(0.1, 5.0), "ours, after Goldberg02";
         /// Distance of two samples under a path.
-        sample_m: f64 = 0.05, "m", Domain::Between(0.01, 0.5), "ours: half a cell, as in domain.md 8.2";
+        sample_m: f64 = 0.05, "m", Domain::Between(0.01, 0.5), "ours: half a cell";
         /// Distance of the leading disc of the footprint from the rover's origin: together they cover the wheels.
-        reach_m: f64 = 0.3, "m", Domain::Between(0.0, 2.0), "ours; domain.md 5.4";
+        reach_m: f64 = 0.3, "m", Domain::Between(0.0, 2.0), "ours";
         /// Angle of the turns in place that are tried if no arc passes.
-        turn_deg: f64 = 20.0, "deg", Domain::Between(1.0, 180.0), "domain.md 8.2";
+        turn_deg: f64 = 20.0, "deg", Domain::Between(1.0, 180.0), "ours, after Goldberg02";
         /// Backing up that is tried if no turn passes either; 0: none.
-        back_up_m: f64 = 0.5, "m", Domain::Between(0.0, 5.0), "ours; driving.md 2";
+        back_up_m: f64 = 0.5, "m", Domain::Between(0.0, 5.0), "ours";
         /// A path is vetoed under which a cell has less goodness, within the driven part.
-        goodness_min: f64 = 0.15, "", Domain::Between(0.0, 0.99), "domain.md 8.2";
+        goodness_min: f64 = 0.15, "", Domain::Between(0.0, 0.99), "ours, after Goldberg02";
         /// A path is vetoed of which a larger share of cells is unknown, within the driven part.
-        unknown_share_max: f64 = 0.30, "", Domain::Between(0.0, 1.0), "domain.md 8.2";
+        unknown_share_max: f64 = 0.30, "", Domain::Between(0.0, 1.0), "ours, after Goldberg02";
         /// Weight of the hazard in the vote.
-        hazard_weight: f64 = 0.6, "", Domain::Between(0.0, 1.0), "domain.md 8.2";
+        hazard_weight: f64 = 0.6, "", Domain::Between(0.0, 1.0), "ours, after Goldberg02";
         /// Weight of the goal in the vote.
-        goal_weight: f64 = 0.3, "", Domain::Between(0.0, 1.0), "domain.md 8.2";
+        goal_weight: f64 = 0.3, "", Domain::Between(0.0, 1.0), "ours, after Goldberg02";
         /// Weight of steering in the vote.
-        steer_weight: f64 = 0.1, "", Domain::Between(0.0, 1.0), "domain.md 8.2";
+        steer_weight: f64 = 0.1, "", Domain::Between(0.0, 1.0), "ours, after Goldberg02";
         /// Angle between heading and route at which the goal term has fallen to 1/e.
-        goal_width_deg: f64 = 25.0, "deg", Domain::Between(1.0, 180.0), "domain.md 8.2";
+        goal_width_deg: f64 = 25.0, "deg", Domain::Between(1.0, 180.0), "ours, after Goldberg02";
         /// Weight of the worst cell in the hazard term; the rest is that of the mean.
-        worst_weight: f64 = 0.5, "", Domain::Between(0.0, 1.0), "domain.md 8.2";
+        worst_weight: f64 = 0.5, "", Domain::Between(0.0, 1.0), "ours, after Goldberg02";
         /// Distance driven in which the certainty of a cell halves in the hazard term; 0: never.
         age_half_life_m: f64 = 0.0, "m", Domain::Between(0.0, 1000.0), "ours; off";
         /// Whether the goal term follows a route over the map instead of the straight line to the goal.
-        has_route: bool = true, "", Domain::Switch, "domain.md 8.1 (D*)";
+        has_route: bool = true, "", Domain::Switch, "ours (D*)";
         /// Distance of the point on the route that a path heads for.
         look_ahead_m: f64 = 1.0, "m", Domain::Between(0.1, 5.0), "ours";
         /// Ground nearer to bad cells costs more.

@@ -20,6 +20,7 @@ use crate::drawing::overlay::Mark;
 use crate::panels::map::site::{in_site, on_map, truth_in_site};
 use crate::panels::names;
 use crate::panels::numbers::fixed;
+use crate::panels::pane::Need;
 use crate::panels::panel::{Panel, TableOf};
 use crate::panels::sheets;
 use crate::pointed::Pointed;
@@ -46,6 +47,10 @@ impl Panel for Map {
 
     fn table(&self) -> Option<TableOf> {
         Some(sheets::places::map)
+    }
+
+    fn needs(&self) -> &'static [Need] {
+        &[Need::Hazards]
     }
 }
 
@@ -105,7 +110,11 @@ fn drive(ui: &mut Ui, state: &State, stops: &[StopView], run: Option<&RunView>, 
         .show_grid([true, true])
         .x_axis_label(theme::note("east, m"))
         .y_axis_label(theme::note("north, m"));
-    let plot = in_site(plot, |at| format!("E {}  N {} m", fixed(at.x, 2), fixed(at.y, 2)));
+    let hazards = driving::hazards::view(state);
+    let plot = in_site(plot, move |at| {
+        let ground = driving::hazards::words_at(hazards.as_deref(), [at.x, at.y]);
+        format!("E {}  N {} m{ground}", fixed(at.x, 2), fixed(at.y, 2))
+    });
     let response = plot.show(ui, |plot| {
         paint_paths(plot, stops, state.cursor.step);
         if let Some(run) = run {
@@ -154,6 +163,14 @@ fn names_of(state: &State, stops: &[StopView]) -> Vec<(Mark, Color32, String)> {
         names.push((Mark::Cross, theme::accent(), "goal".to_owned()));
         names.push((Mark::Stroke(overlay::Line::Dashed), theme::accent(), "planned".to_owned()));
         names.push((Mark::Stroke(overlay::Line::Dashed), theme::weak(), "by wheels alone, 3σ".to_owned()));
+    }
+    if let Some(raster) = state.hazards().ready() {
+        names.push((Mark::Square, theme::goodness(100), "good ground".to_owned()));
+        names.push((Mark::Square, theme::goodness(0), "bad ground".to_owned()));
+        names.push((Mark::Stroke(overlay::Line::Dotted), theme::failed(), "vetoed path".to_owned()));
+        if let Some(why) = &raster.view.missing {
+            names.push((Mark::Square, theme::lost(), format!("no range data here: {why}")));
+        }
     }
     if state.cloud().ready().is_some() {
         names.push((Mark::Dot, theme::run(state.cursor.run), "bootstrap of this step".to_owned()));

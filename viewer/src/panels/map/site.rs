@@ -13,7 +13,7 @@ pub(super) fn on_map(point_in_site: &Point3) -> [f64; 2] {
 }
 
 /// A plot seen from above: few marks, and the place under the pointer in words.
-pub(super) fn in_site<'a>(plot: Plot<'a>, words: fn(&PlotPoint) -> String) -> Plot<'a> {
+pub(super) fn in_site<'a>(plot: Plot<'a>, words: impl Fn(&PlotPoint) -> String + 'a) -> Plot<'a> {
     plot.y_axis_min_width(22.0)
         .grid_color(theme::line())
         .x_grid_spacer(few_marks)

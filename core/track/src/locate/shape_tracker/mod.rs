@@ -102,7 +102,7 @@ impl Tracker for ShapeTracker {
     }
 
     fn locate(&self, input: &LocateInput<'_>, memory: &Views) -> Sighting<ShapeEvidence> {
-        let why = "the shape tracker asks the shape at every stop".to_owned();
+        let why = "the shape tracker registers the surface at every stop".to_owned();
         locate(input, memory, None, Some(why.clone()), why)
     }
 
@@ -144,20 +144,20 @@ impl Tracker for CombinedTracker {
 
     fn locate(&self, input: &LocateInput<'_>, memory: &CombinedMemory) -> Sighting<ShapeEvidence> {
         if input.place.is_hand_over {
-            let why = "other cameras take over here".to_owned();
+            let why = "the target is handed over to other cameras here".to_owned();
             return locate(input, &memory.views, None, Some(why.clone()), why);
         }
         let by_features = FeatureTracker.locate(input, &memory.features);
         let is_lost =
             by_features.position_in_rover.is_none() || by_features.confidence < least_confidence(input);
         let asked = match input.settings.shape.shape_use {
-            _ if input.place.is_last_of_pair => Some("this is the last stop of these cameras"),
-            ShapeUse::EveryStop => Some("the shape is asked at every stop"),
+            _ if input.place.is_last_of_pair => Some("this is the last stop with these cameras"),
+            ShapeUse::EveryStop => Some("the surface is registered at every stop"),
             ShapeUse::WhenLost if is_lost => Some("the features lost the target"),
             ShapeUse::AtEnd | ShapeUse::WhenLost => None,
         };
-        let why =
-            asked.unwrap_or("on the way the features are followed; the shape is asked at the last stop");
+        let why = asked
+            .unwrap_or("features follow the target on the way; the surface is registered at the last stop");
         locate(input, &memory.views, Some(by_features), asked.map(str::to_owned), why.to_owned())
     }
 
@@ -192,7 +192,7 @@ fn remembered(views: Views, evidence: &ShapeEvidence) -> Views {
 
 /// Measures the surface of the designation.
 fn first_view(input: &DesignateInput<'_>, located: &Sighting<ShapeEvidence>, evidence: &mut ShapeEvidence) {
-    evidence.why = "the surface of the designation is what later stops are registered to".to_owned();
+    evidence.why = "later stops are registered to the surface at the designation".to_owned();
     let (Some(position), Some(covariance)) = (located.position_in_rover, located.covariance_in_rover) else {
         return;
     };

@@ -1,0 +1,121 @@
+//! The goodness map under the map of the drive: fetched for the cursor's stop, painted, and read under the pointer.
+
+use std::sync::Arc;
+
+use egui::{Color32, ColorImage, Context, TextureHandle, TextureOptions};
+use egui_plot::{PlotImage, PlotPoint, PlotUi};
+use sightline_rover::hazards::CellBasis;
+use sightline_session::hazard_view::{HazardView, UNKNOWN};
+
+use crate::cache::{Key, Slot};
+use crate::driving::words;
+use crate::panels::digits;
+use crate::state::State;
+use crate::theme;
+
+/// The goodness map of a stop with the texture that shows its known cells.
+pub struct HazardRaster {
+    /// The map.
+    pub view: Arc<HazardView>,
+    /// What shows it, one texel a cell, north up; `None` where no cell is known.
+    shown: Option<Shown>,
+}
+
+struct Shown {
+    texture: TextureHandle,
+    /// Middle and size, east and north, m.
+    middle_m: [f64; 2],
+    size_m: [f32; 2],
+}
+
+impl HazardRaster {
+    /// Makes the texture of a map.
+    pub(crate) fn new(context: &Context, view: HazardView) -> Self {
+        let shown = texture(context, &view);
+        Self { view: Arc::new(view), shown }
+    }
+
+    /// Memory that it takes, bytes.
+    pub(crate) fn bytes(&self) -> usize {
+        let view = &self.view;
+        size_of_val(view.goodness_percent.as_slice())
+            + size_of_val(view.limited_by.as_slice())
+            + size_of_val(view.value.as_slice())
+            + size_of_val(view.basis.as_slice())
+            + 4 * view.side * view.side
+    }
+}
+
+/// The texture of the rectangle of cells that has all known ones.
+fn texture(context: &Context, view: &HazardView) -> Option<Shown> {
+    let side = view.side;
+    let known = || (0..side * side).filter(|&index| view.goodness_percent[index] != UNKNOWN);
+    let rows = [known().map(|index| index / side).min()?, known().map(|index| index / side).max()?];
+    let columns = [known().map(|index| index % side).min()?, known().map(|index| index % side).max()?];
+    let [height, width] = [rows, columns].map(|[first, last]| last - first + 1);
+    let colours: Vec<Color32> = (0..height * width)
+        // The first line of the picture is the northernmost row.
+        .map(|texel| (rows[1] - texel / width) * side + columns[0] + texel % width)
+        .map(|index| theme::goodness(view.goodness_percent[index]))
+        .collect();
+    let image = ColorImage::new([width, height], colours);
+    let texture = context.load_texture("goodness map", image, TextureOptions::NEAREST);
+    let middle =
+        |corner_m: f64, [first, last]: [usize; 2]| corner_m + 0.5 * (first + last + 1) as f64 * view.cell_m;
+    Some(Shown {
+        texture,
+        middle_m: [middle(view.corner_m[1], columns), middle(view.corner_m[0], rows)],
+        size_m: [width, height].map(|cells| (cells as f64 * view.cell_m) as f32),
+    })
+}
+
+impl State {
+    /// The goodness map of the cursor's stop.
+    pub(crate) fn hazards(&self) -> Slot<'_, HazardRaster> {
+        self.hazards_key().map_or(Slot::Absent, |key| self.cache.hazards(&key))
+    }
+
+    /// The name of the goodness map of the cursor's stop, where the navigator chose on one.
+    fn hazards_key(&self) -> Option<Key> {
+        let step = self.cursor.step;
+        self.cycle_at(step)?.range_points?;
+        Some(Key::Hazards { session: self.session.as_ref()?.id.clone(), step })
+    }
+
+    /// The goodness map of the cursor's stop, where a panel shows it.
+    pub(crate) fn want_hazards(&self, keys: &mut Vec<Key>) {
+        keys.extend(self.hazards_key().filter(|_| self.wants_hazards));
+    }
+}
+
+/// Paints the goodness map of the cursor's stop.
+pub(crate) fn paint(plot: &mut PlotUi<'_>, state: &State) {
+    let Some(Shown { texture, middle_m: [east, north], size_m }) =
+        state.hazards().ready().and_then(|raster| raster.shown.as_ref())
+    else {
+        return;
+    };
+    let image = PlotImage::new("goodness", texture.id(), PlotPoint::new(*east, *north), *size_m);
+    plot.image(image.allow_hover(false));
+}
+
+/// What is known of the ground at a place, east and north, m; empty without a goodness map there.
+pub(crate) fn words_at(view: Option<&HazardView>, [east, north]: [f64; 2]) -> String {
+    let Some((view, index)) = view.and_then(|view| Some((view, view.index_at([north, east])?))) else {
+        return String::new();
+    };
+    let goodness = f64::from(view.goodness_percent[index]) / 100.0;
+    let limit = view.limited_by[index].map(|term| words::term(term, f64::from(view.value[index])));
+    match (view.basis[index], limit) {
+        (CellBasis::Unknown, _) => "  ground unknown".to_owned(),
+        (CellBasis::Assumed, _) => "  assumed good near the start".to_owned(),
+        (CellBasis::Exempt, _) => "  exempt near the target".to_owned(),
+        (CellBasis::Measured, None) => format!("  goodness {}", digits(goodness)),
+        (CellBasis::Measured, Some(limit)) => format!("  goodness {}: {limit}", digits(goodness)),
+    }
+}
+
+/// The view of the goodness map of the cursor's stop, shared so that a label can keep it.
+pub(crate) fn view(state: &State) -> Option<Arc<HazardView>> {
+    state.hazards().ready().map(|raster| Arc::clone(&raster.view))
+}
