@@ -1,6 +1,6 @@
-//! A simulated approach small enough to be rendered within a test.
+//! Simulated approaches small enough to be rendered within a test.
 
-use sightline_world::Scenario;
+use sightline_world::{Scenario, library};
 
 /// From 5 m to 3.2 m with images of half the size; the targets' window is halved with them.
 pub fn short_approach() -> Scenario {
@@ -10,5 +10,18 @@ pub fn short_approach() -> Scenario {
     scenario.targets.window_px = 11;
     scenario.drive.start_distance_m = 5.0;
     scenario.drive.end_distance_m = 3.2;
+    scenario
+}
+
+/// From 8 m to 2 m over level ground, with a rock on the straight way that is too high to climb, and front hazcams of 256 px.
+pub fn rock_on_the_way() -> Scenario {
+    let mut scenario = library::scenario("obstacles-10").expect("a scenario of the library");
+    scenario.seed = 3000;
+    (scenario.camera.image_size, scenario.camera.samples_per_axis) = (512, 1);
+    scenario.targets.window_px = 11;
+    scenario.drive.start_distance_m = 8.0;
+    (scenario.rocks.area_fraction, scenario.rocks.smallest_m) = (0.01, 0.1);
+    scenario.terrain.slope_deg = 0.0;
+    scenario.rocks.placed[0].x_m = -4.5;
     scenario
 }

@@ -9,7 +9,7 @@ use sightline_session::hazard_view::{HazardView, UNKNOWN};
 
 use crate::cache::{Key, Slot};
 use crate::driving::words;
-use crate::panels::digits;
+use crate::panels::numbers::fixed;
 use crate::state::State;
 use crate::theme;
 
@@ -110,8 +110,8 @@ pub(crate) fn words_at(view: Option<&HazardView>, [east, north]: [f64; 2]) -> St
         (CellBasis::Unknown, _) => "  ground unknown".to_owned(),
         (CellBasis::Assumed, _) => "  assumed good near the start".to_owned(),
         (CellBasis::Exempt, _) => "  exempt near the target".to_owned(),
-        (CellBasis::Measured, None) => format!("  goodness {}", digits(goodness)),
-        (CellBasis::Measured, Some(limit)) => format!("  goodness {}: {limit}", digits(goodness)),
+        (CellBasis::Measured, None) => format!("  goodness {}", fixed(goodness, 2)),
+        (CellBasis::Measured, Some(limit)) => format!("  goodness {}: {limit}", fixed(goodness, 2)),
     }
 }
 

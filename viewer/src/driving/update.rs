@@ -72,7 +72,7 @@ impl State {
     }
 
     /// Takes the drive in; a cursor at the rover's last stop goes with the rover.
-    fn took_drive(&mut self, session: String, view: DriveView) {
+    pub(crate) fn took_drive(&mut self, session: String, view: DriveView) {
         let newest = |view: &DriveView| {
             let paused = view.paused.map(|halt| halt.stop);
             view.cycles.last().map(|cycle| cycle.step).max(paused)

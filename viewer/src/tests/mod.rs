@@ -12,6 +12,7 @@ mod figures;
 pub(crate) mod fixture;
 #[path = "../what_if/tests.rs"]
 mod ghost;
+mod hazards;
 mod history;
 mod keeping;
 mod playing;

@@ -1,0 +1,71 @@
+//! The goodness map of a drive by REST: the map on which the navigator chose, and why there is none.
+
+use serde_json::{Value, json};
+use sightline_recordings::{Traverse, create_simulated};
+use sightline_tests::scenario::rock_on_the_way;
+use sightline_tests::server::{TestServer, small_drive};
+use sightline_world::choose_targets;
+
+use crate::driving::{begin, waited, waits_at};
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_map_of_a_stop_has_the_rock_for_which_paths_were_vetoed() {
+    let scenario = rock_on_the_way();
+    let (drive, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let path = drive.path().join("drive");
+    create_simulated(&scenario, &path).unwrap();
+    let traverse = Traverse::open(&path).unwrap();
+    let pixel = choose_targets(traverse.world().unwrap(), &scenario, traverse.index())[0];
+
+    let server = TestServer::open(&path, folder.path());
+    let session = server.begin().await;
+    let target = json!({ "step": 0, "pixel": { "x": pixel.x, "y": pixel.y } });
+    server.post(&format!("sessions/{session}/targets"), &target).await.expect(201);
+    let new = json!({ "command": { "navigator": "gestalt", "goal": "fixed" }, "pause_at": 3 });
+    let begun = server.post(&format!("sessions/{session}/targets/0/runs/0/drive"), &new).await.expect(201);
+    let session = begun["id"].as_str().unwrap();
+    let driven = waited(&server, session, waits_at(3)).await;
+
+    let vetoes = |cycle: &Value| -> Vec<[f64; 2]> {
+        let candidates = cycle["choice"]["candidates"].as_array().unwrap();
+        let at = |veto: &Value| [0, 1].map(|axis| veto["in_site_m"][axis].as_f64().unwrap());
+        candidates.iter().map(|one| &one["veto"]).filter(|veto| !veto.is_null()).map(at).collect()
+    };
+    let cycles = driven["cycles"].as_array().unwrap();
+    let (step, vetoed) = cycles
+        .iter()
+        .enumerate()
+        .map(|(step, cycle)| (step, vetoes(cycle)))
+        .find(|(_, vetoed)| !vetoed.is_empty())
+        .expect("the rock is in the way of a path");
+    let map = server.get(&format!("sessions/{session}/drive/steps/{step}/hazards")).await.expect(200);
+    let side = map["side"].as_u64().unwrap() as usize;
+    for column in ["goodness_percent", "limited_by", "value", "basis"] {
+        assert_eq!(map[column].as_array().unwrap().len(), side * side, "{column}");
+    }
+    assert_eq!(map["range_points"], cycles[step]["range_points"]);
+    let number = |axis: usize, at_m: f64| {
+        let corner_m = map["corner_m"][axis].as_f64().unwrap();
+        ((at_m - corner_m) / map["cell_m"].as_f64().unwrap()).floor() as usize
+    };
+    for [north, east] in vetoed {
+        let index = number(0, north) * side + number(1, east);
+        let goodness = map["goodness_percent"][index].as_i64().unwrap();
+        assert!(goodness < 16, "a failing cell at {north} {east} has the goodness {goodness}");
+        assert!(map["limited_by"][index].is_string());
+    }
+    let later = server.get(&format!("sessions/{session}/drive/steps/9/hazards")).await;
+    assert!(later.problem(404, "not_found").contains("has not come to step 9"));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_drive_without_a_map_says_how_to_get_one() {
+    let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
+    let server = TestServer::open(drive.path(), folder.path());
+    let session = begin(&server, &json!({ "command": { "standoff_m": 3.0 }, "pause_at": 0 })).await;
+    waited(&server, &session, waits_at(0)).await;
+    let refused = server.get(&format!("sessions/{session}/drive/steps/0/hazards")).await;
+    assert!(refused.problem(409, "conflict").contains("`arcs` uses no hazard map"));
+    let refused = server.get("sessions/s1/drive/steps/0/hazards").await;
+    assert!(refused.problem(409, "conflict").contains("not on commands"));
+}

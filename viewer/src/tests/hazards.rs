@@ -1,0 +1,113 @@
+//! The goodness map and the paths of a stop: fetched with the panel, named on the map, listed in the inspector.
+
+use std::sync::Arc;
+
+use serde_json::json;
+use sightline_rover::hazards::{CellBasis, HazardTerm};
+use sightline_session::driving::{DriveView, Steering};
+use sightline_session::hazard_view::{HazardView, UNKNOWN};
+
+use super::Shown;
+use super::fixture;
+use crate::cache::{Item, Key};
+use crate::command::{Command, Stage};
+use crate::driving::hazards::{HazardRaster, words_at};
+use crate::panels::pane::{Need, Pane};
+use crate::state::State;
+
+const STEP: usize = 2;
+
+/// Four cells of half a metre north-east of (0, 0): bad, unknown, good, exempt.
+fn view() -> HazardView {
+    HazardView {
+        step: STEP,
+        range_points: Some(900),
+        missing: None,
+        cell_m: 0.5,
+        side: 2,
+        corner_m: [0.0, 0.0],
+        goodness_percent: vec![0, UNKNOWN, 100, 100],
+        limited_by: vec![Some(HazardTerm::Step), Some(HazardTerm::Unknown), None, None],
+        value: vec![0.21, 0.1, 0.0, 0.0],
+        basis: vec![CellBasis::Measured, CellBasis::Unknown, CellBasis::Measured, CellBasis::Exempt],
+    }
+}
+
+/// A drive whose navigator chose the second of two paths, with the goodness map of the stop.
+fn driving(context: &egui::Context) -> State {
+    let mut state = fixture::at_step(context, STEP);
+    let terms = json!({ "hazard": 0.8, "goal": 0.9, "steer": 1.0 });
+    let path = |curvature_per_m: f64, veto| {
+        json!({ "motion": { "kind": "arc", "length_m": 0.5, "curvature_per_m": curvature_per_m }, "evaluated_m": 1.2,
+            "terms": terms, "vote": 0.85, "unknown_share": 0.1, "veto": veto })
+    };
+    let veto =
+        json!({ "in_site_m": [0.2, 0.2], "along_m": 0.4, "term": "step", "value": 0.21, "limit": 0.18 });
+    let choice = json!({ "candidates": [path(0.0, veto), path(0.0625, json!(null))], "chosen": 1,
+        "route_m": [[2.0, 0.2], [4.0, 0.5]] });
+    let cycles: Vec<_> = (0..=STEP)
+        .map(|step| {
+            let mut cycle = fixture::cycle(step);
+            (cycle["choice"], cycle["range_points"]) = (choice.clone(), json!(900));
+            cycle
+        })
+        .collect();
+    let steering = json!({ "target": 0, "run": 0, "command": { "navigator": "gestalt" } });
+    let drive: DriveView = serde_json::from_value(
+        json!({ "steering": steering, "cycles": cycles, "summary": null, "is_driving": false }),
+    )
+    .unwrap();
+    if let Some(session) = &mut state.session {
+        session.steering = Some(serde_json::from_value::<Steering>(steering).unwrap());
+    }
+    state.took_drive("s1".to_owned(), drive);
+    state
+}
+
+fn with_map(context: &egui::Context) -> State {
+    let mut state = driving(context);
+    let raster = HazardRaster::new(context, view());
+    let key = Key::Hazards { session: "s1".to_owned(), step: STEP };
+    state.cache.arrived(key, Ok(Item::Hazards(Arc::new(raster))), 0.0);
+    state
+}
+
+#[test]
+fn the_goodness_map_is_fetched_while_a_panel_shows_it() {
+    let mut state = driving(&egui::Context::default());
+    let key = Key::Hazards { session: "s1".to_owned(), step: STEP };
+    assert!(!state.wanted().contains(&key));
+    state.fetch_for_panels(&[Need::Hazards]);
+    assert!(state.wanted().contains(&key));
+}
+
+#[test]
+fn the_map_names_good_and_bad_ground_once_it_is_known() {
+    Shown::pane(Pane::Map, driving).hides("good ground").says("planned");
+    Shown::pane(Pane::Map, with_map).says("good ground").says("bad ground").says("vetoed path");
+}
+
+#[test]
+fn the_ground_under_the_pointer_is_told_in_words() {
+    let view = view();
+    let at = |east: f64, north: f64| words_at(Some(&view), [east, north]);
+    assert_eq!(at(0.1, 0.1), "  goodness 0.00: step 21.0 cm");
+    assert_eq!(at(0.9, 0.1), "  ground unknown");
+    assert_eq!(at(0.1, 0.9), "  goodness 1.00");
+    assert_eq!(at(0.9, 0.9), "  exempt near the target");
+    assert_eq!([at(3.0, 0.1), words_at(None, [0.1, 0.1])], ["", ""]);
+}
+
+#[test]
+fn the_inspector_lists_every_path_with_its_vote_or_its_first_failing_cell() {
+    let make = |context: &egui::Context| {
+        let mut state = driving(context);
+        state.perform(Command::SelectStage(Stage::SELECT_PATH));
+        state
+    };
+    let shown = Shown::new([700.0, 500.0], make, |ui, state, out| {
+        super::show_pane(ui, Pane::Inspector, state, out);
+    });
+    shown.says("1 of 2 paths are open").says("radius 16 m right (chosen)");
+    shown.says("step 21.0 cm after 0.40 m, limit 18.0 cm").says("0.85");
+}
