@@ -2,14 +2,13 @@
 
 use std::time::Duration;
 
-use serde_json::Value;
-use sightline_tests::bench::picked;
+use sightline_tests::bench::{Bench, picked};
 use sightline_tests::browser::Browser;
 use sightline_tests::scenario::short_approach;
 
 #[tokio::test(flavor = "multi_thread")]
 async fn the_rover_drives_waits_goes_on_with_another_setting_arrives_and_branches() {
-    let (_bench, browser) = picked(&short_approach()).await;
+    let (bench, browser) = picked(&short_approach()).await;
     let planned = browser.status().await["session"].as_str().unwrap().to_owned();
     browser.show_panel("Drive").await;
     browser.shot("drive-form").await;
@@ -17,8 +16,7 @@ async fn the_rover_drives_waits_goes_on_with_another_setting_arrives_and_branche
     // At the first stop nothing is matched that another limit could change.
     let under_way = format!("s.session !== '{planned}' && s.drive === 'drives' && s.steps_done > 1");
     browser.wait_status("the drive", &under_way).await;
-    browser.click_on("button", "Pause").await;
-    browser.wait_status("the rover waits", "s.drive === 'waits' && s.shown").await;
+    pause_before_driving(&bench, &browser).await;
     browser.shot("drive-waits").await;
     let waited = browser.status().await;
     let stops = waited["stop_count"].as_u64().unwrap();
@@ -48,6 +46,22 @@ async fn the_rover_drives_waits_goes_on_with_another_setting_arrives_and_branche
     browser.end().await;
 }
 
+/// Lets the rover wait before it drives from a stop, and returns that stop. A rover that has left the stop meanwhile waits at once
+/// at the next one, and goes on there to the same stage.
+async fn pause_before_driving(bench: &Bench, browser: &Browser) -> u64 {
+    browser.click_on("button", "Pause").await;
+    browser.wait_status("a pause", "s.drive === 'waits' && s.paused_before !== null").await;
+    if browser.status().await["paused_before"] != "drive" {
+        browser.click_on("button", "Continue").await;
+    }
+    browser.wait_status("the pause before drive", "s.drive === 'waits' && s.paused_before === 'drive'").await;
+    let session = browser.status().await["session"].as_str().unwrap().to_owned();
+    let paused = bench.json(&format!("/api/v1/sessions/{session}/drive"))["paused"].clone();
+    let stop = paused["stop"].as_u64().unwrap();
+    browser.wait_status("its stop", &format!("s.stop_count === {} && s.shown", stop + 1)).await;
+    stop
+}
+
 /// Chooses the stage of the pause; the stage bar has a button of the same name.
 async fn choose_stage(browser: &Browser, stage: &str) {
     let in_bar = browser.control("button", stage).await;
@@ -70,16 +84,9 @@ async fn a_paused_stage_is_repeated_with_another_setting_and_the_drive_goes_on_s
     browser.show_panel("Drive").await;
     browser.click_on("button", "Drive").await;
     browser.wait_status("the drive", &format!("s.session !== '{planned}' && s.drive === 'drives'")).await;
-    browser.click_on("button", "Pause").await;
-    browser.wait_status("the rover waits", "s.drive === 'waits' && s.paused_before !== null").await;
-    let session = browser.status().await["session"].as_str().unwrap().to_owned();
-    let paused = bench.json(&format!("/api/v1/sessions/{session}/drive"))["paused"].clone();
-    let last = paused["stop"].as_u64().unwrap();
-    browser.wait_status("the last stop", &format!("s.stop_count === {}", last + 1)).await;
+    let stop = pause_before_driving(&bench, &browser).await + 1;
 
-    // It is to wait after `locate`: at this stop where that stage is still to come, else at the next one.
-    let located = ["judge", "update", "set_goal", "select_path", "drive"].map(Value::from);
-    let stop = if located.contains(&paused["before"]) { last + 1 } else { last };
+    // At the next stop it is to wait after `locate`.
     browser.click_on("combobox", "pause before or after").await;
     browser.choose("after").await;
     choose_stage(&browser, "locate").await;

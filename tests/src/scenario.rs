@@ -19,7 +19,7 @@ pub fn rock_on_the_way() -> Scenario {
     scenario.seed = 3000;
     (scenario.camera.image_size, scenario.camera.samples_per_axis) = (512, 1);
     scenario.targets.window_px = 11;
-    scenario.drive.start_distance_m = 8.0;
+    (scenario.drive.start_distance_m, scenario.drive.end_distance_m) = (8.0, 7.2);
     (scenario.rocks.area_fraction, scenario.rocks.smallest_m) = (0.01, 0.1);
     scenario.terrain.slope_deg = 0.0;
     scenario.rocks.placed[0].x_m = -4.5;
