@@ -13,6 +13,7 @@ use sightline_geometry::error::{Error, Result};
 use sightline_recordings::DrivenTraverse;
 use sightline_rover::driving::{DriveCommand, HazardMaps, OdometryPair, executive, odometry};
 use sightline_rover::pipeline::Stops;
+use sightline_session::Run;
 use sightline_session::driving::{self, DriveView, Steering};
 use sightline_session::hazard_view::HazardView;
 use sightline_session::step::RunStep;
@@ -266,15 +267,26 @@ fn prepare_stop(
     lock(&driven.world).put_off(None)
 }
 
+/// Who drives in a session, with its run.
+fn steered(live: &LiveSession) -> (Option<Steering>, Option<Run>) {
+    live.with(|session| {
+        let steering = session.steering.clone();
+        let run = steering.as_ref().and_then(|to| session.run(to.target, to.run).ok().cloned());
+        (steering, run)
+    })
+}
+
 /// The drive of a session.
 pub(crate) fn view(live: &LiveSession) -> DriveView {
+    let (steering, run) = steered(live);
+    // Read after the run: it has the stops of all its steps.
     let open = live.traverse();
-    let steering = live.with(|session| session.steering.clone());
     let (Some(steering), Some(driven)) = (&steering, &open.driven) else {
         return DriveView { steering, ..DriveView::default() };
     };
-    let run = live.with(|session| session.run(steering.target, steering.run).cloned());
-    let Ok(run) = run else { return DriveView { steering: Some(steering.clone()), ..DriveView::default() } };
+    let Some(run) = run else {
+        return DriveView { steering: Some(steering.clone()), ..DriveView::default() };
+    };
     let is_driving = live.is_computing(steering.target, steering.run);
     let mut maps = lock(&driven.maps);
     // Never cancelled.
@@ -287,8 +299,9 @@ pub(crate) fn view(live: &LiveSession) -> DriveView {
 /// # Errors
 /// A problem for a session without a drive, a navigator without a map, and a step that the drive has not come to.
 pub(crate) fn hazards(live: &LiveSession, step: usize, cancel: &CancelFlag) -> ApiResult<HazardView> {
+    let (steering, run) = steered(live);
+    // Read after the run: it has the stops of all its steps.
     let open = live.traverse();
-    let steering = live.with(|session| session.steering.clone());
     let (Some(steering), Some(driven)) = (steering, &open.driven) else {
         return Err(ApiError::conflict("The drive of this session is not on commands."));
     };
@@ -297,8 +310,7 @@ pub(crate) fn hazards(live: &LiveSession, step: usize, cancel: &CancelFlag) -> A
         let problem = format!("The navigator `{}` uses no hazard map.", navigator.name());
         return Err(ApiError::conflict(problem).hint("Choose `gestalt` or `morphin` in the command."));
     }
-    let run = live.with(|session| session.run(steering.target, steering.run).cloned())?;
-    let steps = run.whole_steps();
+    let steps = run.as_ref().map(Run::whole_steps).unwrap_or_default();
     let (Some(first), Some(last)) = (steps.first(), steps.iter().find(|known| known.step == step)) else {
         return Err(ApiError::not_found(format!("The drive has not come to step {step}.")));
     };
@@ -308,7 +320,8 @@ pub(crate) fn hazards(live: &LiveSession, step: usize, cancel: &CancelFlag) -> A
         [&first.trace, &last.trace],
         cancel.as_ref().into(),
     )?;
-    let none = || ApiError::not_found(format!("Step {step} has no hazard map, because its pair is missing."));
+    let none =
+        || ApiError::not_found(format!("Step {step} has no hazard map: the drive has no pair for it."));
     found.map(|hazards| HazardView::of(&hazards)).ok_or_else(none)
 }
 

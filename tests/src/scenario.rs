@@ -13,7 +13,8 @@ pub fn short_approach() -> Scenario {
     scenario
 }
 
-/// From 8 m to 2 m over level ground, with a rock on the straight way that is too high to climb, and front hazcams of 256 px.
+/// Starts 8 m from the target on level ground; the planned drive ends at 7.2 m, before a rock on the straight way that is too high
+/// to climb. Front hazcams of 256 px.
 pub fn rock_on_the_way() -> Scenario {
     let mut scenario = library::scenario("obstacles-10").expect("a scenario of the library");
     scenario.seed = 3000;

@@ -140,7 +140,7 @@ fn on_a_flat_wall_the_shape_tracker_says_what_is_missing() {
         let reason = trace.verdict().unwrap().reason.clone().unwrap();
         assert!(trace.update.state.is_lost());
         assert!(
-            reason.contains("leaves the target uncertain") || reason.contains("nearly as well"),
+            reason.contains("target uncertainty after registration") || reason.contains("nearly as well"),
             "{reason}"
         );
     }

@@ -213,7 +213,7 @@ fn every_preset_tracks_a_facing_plane_in_steps_of_a_twentieth_but_for_the_shape_
         if preset.name == "shape" {
             assert!(
                 last.update.state.is_lost()
-                    && last.row().reason.unwrap().contains("leaves the target uncertain")
+                    && last.row().reason.unwrap().contains("target uncertainty after registration")
             );
             continue;
         }

@@ -35,8 +35,12 @@ pub(super) fn html(source: &Source, run: NamedRun<'_>, cancel: &AtomicBool) -> A
         }
         None => text.push_str("<p>The target was not lost at any step.</p>\n"),
     }
+    let worst = worst(steps, lost);
+    if worst.is_empty() {
+        return Ok(text);
+    }
     text.push_str("<h3>Worst steps</h3>\n<div class=\"row\">");
-    for place in worst(steps, lost) {
+    for place in worst {
         text.push_str(&figure(place)?);
     }
     let _ = writeln!(text, "</div>\n<p class=\"at\">{}</p>", escape(picture::LEGEND));

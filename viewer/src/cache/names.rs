@@ -57,6 +57,8 @@ pub enum Key {
         session: String,
         /// The stop.
         step: usize,
+        /// What of the command and of who drives has an influence on it.
+        rules: String,
     },
     /// What a step saw and decided.
     Trace(StepKey),

@@ -1,4 +1,4 @@
-//! The goodness map under the map of the drive: fetched for the cursor's stop, painted, and read under the pointer.
+//! The layer of the goodness map on the map of the drive: its texture, its fetching, and the ground at the pointer in words.
 
 use std::sync::Arc;
 
@@ -18,14 +18,15 @@ pub struct HazardRaster {
     /// The map.
     pub view: Arc<HazardView>,
     /// What shows it, one texel a cell, north up; `None` where no cell is known.
-    shown: Option<Shown>,
+    pub(crate) shown: Option<Shown>,
 }
 
-struct Shown {
+/// How a goodness map is shown.
+pub(crate) struct Shown {
     texture: TextureHandle,
     /// Middle and size, east and north, m.
-    middle_m: [f64; 2],
-    size_m: [f32; 2],
+    pub(crate) middle_m: [f64; 2],
+    pub(crate) size_m: [f32; 2],
 }
 
 impl HazardRaster {
@@ -46,18 +47,27 @@ impl HazardRaster {
     }
 }
 
-/// The texture of the rectangle of cells that has all known ones.
+/// First and last row, and first and last column, of the bounding box of the known cells; `None` where no cell is known.
+fn known_box(view: &HazardView) -> Option<[[usize; 2]; 2]> {
+    let known = || (0..view.side * view.side).filter(|&index| view.goodness_percent[index] != UNKNOWN);
+    let rows = [known().map(|index| index / view.side).min()?, known().map(|index| index / view.side).max()?];
+    let columns = known().map(|index| index % view.side);
+    Some([rows, [columns.clone().min()?, columns.max()?]])
+}
+
+/// The goodness of the cells of the bounding box as a picture: the first line is the northernmost row.
+pub(crate) fn texels(view: &HazardView) -> Vec<i8> {
+    let Some([rows, columns]) = known_box(view) else { return Vec::new() };
+    let line =
+        |row: usize| &view.goodness_percent[row * view.side + columns[0]..=row * view.side + columns[1]];
+    (rows[0]..=rows[1]).rev().flat_map(line).copied().collect()
+}
+
+/// The texture of the bounding box of the known cells.
 fn texture(context: &Context, view: &HazardView) -> Option<Shown> {
-    let side = view.side;
-    let known = || (0..side * side).filter(|&index| view.goodness_percent[index] != UNKNOWN);
-    let rows = [known().map(|index| index / side).min()?, known().map(|index| index / side).max()?];
-    let columns = [known().map(|index| index % side).min()?, known().map(|index| index % side).max()?];
+    let [rows, columns] = known_box(view)?;
     let [height, width] = [rows, columns].map(|[first, last]| last - first + 1);
-    let colours: Vec<Color32> = (0..height * width)
-        // The first line of the picture is the northernmost row.
-        .map(|texel| (rows[1] - texel / width) * side + columns[0] + texel % width)
-        .map(|index| theme::goodness(view.goodness_percent[index]))
-        .collect();
+    let colours: Vec<Color32> = texels(view).into_iter().map(theme::goodness).collect();
     let image = ColorImage::new([width, height], colours);
     let texture = context.load_texture("goodness map", image, TextureOptions::NEAREST);
     let middle =
@@ -78,8 +88,16 @@ impl State {
     /// The name of the goodness map of the cursor's stop, where the navigator chose on one.
     fn hazards_key(&self) -> Option<Key> {
         let step = self.cursor.step;
-        self.cycle_at(step)?.range_points?;
-        Some(Key::Hazards { session: self.session.as_ref()?.id.clone(), step })
+        self.cycle_at(step)?;
+        let steering = self.drive()?.steering.as_ref()?;
+        let command = &steering.command;
+        if !command.navigator.needs_map() {
+            return None;
+        }
+        // The exemption is around the target of the run that drives.
+        let by = [steering.target, steering.run];
+        let rules = format!("{by:?} {:?} {}", command.hazard_camera, command.exemption_radius_m);
+        Some(Key::Hazards { session: self.session.as_ref()?.id.clone(), step, rules })
     }
 
     /// The goodness map of the cursor's stop, where a panel shows it.
@@ -99,7 +117,7 @@ pub(crate) fn paint(plot: &mut PlotUi<'_>, state: &State) {
     plot.image(image.allow_hover(false));
 }
 
-/// What is known of the ground at a place, east and north, m; empty without a goodness map there.
+/// Describes the ground at a position, east and north, m; empty without a goodness map there.
 pub(crate) fn words_at(view: Option<&HazardView>, [east, north]: [f64; 2]) -> String {
     let Some((view, index)) = view.and_then(|view| Some((view, view.index_at([north, east])?))) else {
         return String::new();

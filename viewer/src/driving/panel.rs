@@ -89,7 +89,7 @@ fn form(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         let modes = [OdometryMode::Off, OdometryMode::SlipCheck, OdometryMode::Full];
         choice(ui, "visual odometry", 160.0, modes, &mut command.odometry, words::odometry);
         let navigators = [NavigatorKind::Arcs, NavigatorKind::Gestalt, NavigatorKind::Morphin];
-        let help = "What chooses the motions. Avoiding hazards needs a pair of hazcams at every stop.";
+        let help = "Selects the motions. Hazard avoidance needs a pair of hazcams at every stop.";
         let shown = choice(ui, "navigator", 170.0, navigators, &mut command.navigator, words::navigator);
         shown.on_hover_text(help);
     });

@@ -45,11 +45,11 @@ pub(crate) fn table(ui: &mut Ui, choice: &PathChoice) {
     let count = choice.candidates.len();
     let open = count - choice.vetoed_count();
     ui.label(theme::note(format!(
-        "{open} of {count} paths are open; vote = hazard, goal and steering, weighted"
+        "{open} of {count} paths are not vetoed; vote = weighted sum of goodness, goal and steering"
     )));
     ScrollArea::horizontal().id_salt("paths").show(ui, |ui| {
         Grid::new("paths").num_columns(6).striped(true).spacing([10.0, 2.0]).show(ui, |ui| {
-            for head in ["path", "vote", "hazard", "goal", "steering", "first failing cell"] {
+            for head in ["path", "vote", "goodness", "goal", "steering", "first failing cell"] {
                 ui.label(theme::note(head));
             }
             ui.end_row();

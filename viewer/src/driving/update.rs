@@ -137,9 +137,12 @@ impl State {
         }
     }
 
-    /// The stop at which the rover stands.
+    /// The stop at which the rover stands: the drive may be known further than the session.
     fn last_stop(&self) -> Option<usize> {
-        self.session.as_ref()?.stop_count.checked_sub(1)
+        let listed = self.session.as_ref()?.stop_count.checked_sub(1);
+        let decided = self.drive().and_then(|drive| drive.cycles.last()).map(|cycle| cycle.step);
+        let halted = self.halt().map(|halt| halt.stop);
+        [listed, decided, halted].into_iter().flatten().max()
     }
 
     fn steered(&self) -> Option<Steering> {
@@ -231,6 +234,17 @@ mod tests {
             _ => None,
         });
         calls.filter(|(path, _)| path.contains("drive")).collect()
+    }
+
+    #[test]
+    fn one_stop_more_counts_from_the_stop_that_the_drive_has_come_to() {
+        let mut state = driving(1);
+        state.took_drive("s1".to_owned(), view(9, false));
+        assert_eq!(state.session.as_ref().unwrap().stop_count, 6, "the session is read later");
+        state.take_requests();
+        state.perform(Command::Drive(Ask::OneStop));
+        let (_, body) = calls_of(&mut state).remove(0);
+        assert_eq!(body.unwrap()["pause_at"], 9);
     }
 
     #[test]

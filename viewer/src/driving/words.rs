@@ -48,8 +48,8 @@ pub(super) fn reason(reason: StopReason) -> &'static str {
 pub(super) fn navigator(navigator: NavigatorKind) -> &'static str {
     match navigator {
         NavigatorKind::Arcs => "no hazard avoidance",
-        NavigatorKind::Gestalt => "avoids hazards as gestalt",
-        NavigatorKind::Morphin => "avoids hazards as morphin",
+        NavigatorKind::Gestalt => "hazard avoidance, gestalt",
+        NavigatorKind::Morphin => "hazard avoidance, morphin",
     }
 }
 
@@ -65,14 +65,17 @@ pub(super) fn term(term: HazardTerm, value: f64) -> String {
 
 /// Why a path must not be driven.
 pub(super) fn veto(veto: &Veto) -> String {
-    let (name, scale, unit, decimals) = match veto.term {
-        HazardTerm::Tilt => ("tilt", 1.0, "°", 1),
-        HazardTerm::Roughness => ("roughness", 100.0, " cm", 1),
-        HazardTerm::Step => ("step", 100.0, " cm", 1),
-        HazardTerm::Unknown => ("unknown ground", 100.0, " %", 0),
+    let (name, scale, unit) = match veto.term {
+        HazardTerm::Tilt => ("tilt", 1.0, "°"),
+        HazardTerm::Roughness => ("roughness", 100.0, " cm"),
+        HazardTerm::Step => ("step", 100.0, " cm"),
+        HazardTerm::Unknown => {
+            let [value, limit] = [veto.value, veto.limit].map(|share| fixed(100.0 * share, 0));
+            return format!("{value} % of the path is unknown, limit {limit} %");
+        }
     };
-    let [value, limit] = [veto.value, veto.limit].map(|value| fixed(scale * value, decimals));
-    format!("{name} {value}{unit} after {} m, limit {limit}{unit}", fixed(veto.along_m, 2))
+    let [value, limit] = [veto.value, veto.limit].map(|value| fixed(scale * value, 1));
+    format!("{name} {value}{unit} at {} m, limit {limit}{unit}", fixed(veto.along_m, 2))
 }
 
 /// What visual odometry is used for.
@@ -182,8 +185,8 @@ mod tests {
     #[test]
     fn a_veto_names_the_term_with_its_limit() {
         let of = |term, value, limit| veto(&Veto { in_site_m: [0.0; 2], along_m: 0.6, term, value, limit });
-        assert_eq!(of(HazardTerm::Step, 0.25, 0.18), "step 25.0 cm after 0.60 m, limit 18.0 cm");
-        assert_eq!(of(HazardTerm::Unknown, 0.5, 0.3), "unknown ground 50 % after 0.60 m, limit 30 %");
+        assert_eq!(of(HazardTerm::Step, 0.25, 0.18), "step 25.0 cm at 0.60 m, limit 18.0 cm");
+        assert_eq!(of(HazardTerm::Unknown, 0.5, 0.3), "50 % of the path is unknown, limit 30 %");
     }
 
     #[test]

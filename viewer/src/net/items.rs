@@ -30,7 +30,7 @@ pub(crate) fn call(key: &Key) -> Call {
         Key::Odometry { traverse, step } => {
             Call::to::<ShowStopOdometry>(&AtStop { id: traverse.clone(), step: *step })
         }
-        Key::Hazards { session, step } => {
+        Key::Hazards { session, step, .. } => {
             Call::to::<ShowHazards>(&AtDriveStop { session: session.clone(), step: *step })
         }
         Key::Trace(step) => Call::to::<ShowStep>(step),

@@ -2,6 +2,7 @@
 
 use crate::cache::Slot;
 use crate::state::State;
+use sightline_session::driving::DriveView;
 use sightline_track::trace::ODOMETRY_ALONE;
 
 impl State {
@@ -57,10 +58,11 @@ impl State {
         if self.cursor.step + 1 < self.stop_count() {
             return format!(" Press → {purpose}.");
         }
-        match self.drive_word() {
-            Some("drives") => " The rover drives; its next stop is added here.".to_owned(),
-            Some("waits") => " The rover waits; continue in the panel Drive.".to_owned(),
-            _ => " This drive has no further stop.".to_owned(),
+        let goes_on = |drive: &&DriveView| drive.cycles.last().is_none_or(|cycle| cycle.ending.is_none());
+        match self.drive().filter(goes_on).map(|drive| drive.is_driving) {
+            Some(true) => " The rover drives; its next stop is added here.".to_owned(),
+            Some(false) => " The rover waits; continue in the panel Drive.".to_owned(),
+            None => " This drive has no further stop.".to_owned(),
         }
     }
 

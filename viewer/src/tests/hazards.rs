@@ -11,7 +11,7 @@ use super::Shown;
 use super::fixture;
 use crate::cache::{Item, Key};
 use crate::command::{Command, Stage};
-use crate::driving::hazards::{HazardRaster, words_at};
+use crate::driving::hazards::{HazardRaster, texels, words_at};
 use crate::panels::pane::{Need, Pane};
 use crate::state::State;
 
@@ -64,10 +64,17 @@ fn driving(context: &egui::Context) -> State {
     state
 }
 
+/// The name of the goodness map that is wanted.
+fn key(state: &mut State) -> Key {
+    state.fetch_for_panels(&[Need::Hazards]);
+    let is_hazards = |key: &Key| matches!(key, Key::Hazards { step: STEP, .. });
+    state.wanted().into_iter().find(is_hazards).expect("a goodness map")
+}
+
 fn with_map(context: &egui::Context) -> State {
     let mut state = driving(context);
     let raster = HazardRaster::new(context, view());
-    let key = Key::Hazards { session: "s1".to_owned(), step: STEP };
+    let key = key(&mut state);
     state.cache.arrived(key, Ok(Item::Hazards(Arc::new(raster))), 0.0);
     state
 }
@@ -75,10 +82,25 @@ fn with_map(context: &egui::Context) -> State {
 #[test]
 fn the_goodness_map_is_fetched_while_a_panel_shows_it() {
     let mut state = driving(&egui::Context::default());
-    let key = Key::Hazards { session: "s1".to_owned(), step: STEP };
-    assert!(!state.wanted().contains(&key));
-    state.fetch_for_panels(&[Need::Hazards]);
-    assert!(state.wanted().contains(&key));
+    let is_hazards = |key: &Key| matches!(key, Key::Hazards { step: STEP, .. });
+    assert!(!state.wanted().iter().any(is_hazards));
+    let first = key(&mut state);
+    // Another exemption makes another map.
+    if let Some((_, view)) = &mut state.driving.view
+        && let Some(steering) = &mut view.steering
+    {
+        steering.command.exemption_radius_m = 1.0;
+    }
+    assert_ne!(key(&mut state), first);
+}
+
+#[test]
+fn the_northernmost_row_is_the_first_line_of_the_picture() {
+    let context = egui::Context::default();
+    let raster = HazardRaster::new(&context, view());
+    let shown = raster.shown.as_ref().unwrap();
+    assert_eq!((shown.middle_m, shown.size_m), ([0.5, 0.5], [1.0, 1.0]));
+    assert_eq!(texels(&raster.view), [100, 100, 0, UNKNOWN]);
 }
 
 #[test]
@@ -108,6 +130,6 @@ fn the_inspector_lists_every_path_with_its_vote_or_its_first_failing_cell() {
     let shown = Shown::new([700.0, 500.0], make, |ui, state, out| {
         super::show_pane(ui, Pane::Inspector, state, out);
     });
-    shown.says("1 of 2 paths are open").says("radius 16 m right (chosen)");
-    shown.says("step 21.0 cm after 0.40 m, limit 18.0 cm").says("0.85");
+    shown.says("1 of 2 paths are not vetoed").says("radius 16 m right (chosen)");
+    shown.says("step 21.0 cm at 0.40 m, limit 18.0 cm").says("0.85");
 }

@@ -112,8 +112,8 @@ fn why(step: usize) -> String {
     let why = match step {
         0 => "later stops are registered to the surface at the designation",
         1 => "features follow the target on the way; the surface is registered at the last stop",
-        HAND_OFF => "the target is handed over to other cameras here",
-        _ => "this is the last stop with these cameras",
+        HAND_OFF => "hand-off to other cameras at this stop",
+        _ => "last stop with these cameras",
     };
     why.to_owned()
 }

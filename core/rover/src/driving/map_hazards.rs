@@ -121,7 +121,7 @@ impl HazardMaps {
     /// The hazards of the stop of a step of a drive since the designation; `None` for a navigator without a map.
     ///
     /// # Errors
-    /// [`Error::Cancelled`].
+    /// [`Error::Cancelled`], and images that cannot be read or written.
     pub fn at(
         &mut self,
         stops: &dyn Stops,
@@ -196,13 +196,12 @@ impl HazardMaps {
         cancel.check()?;
         let sizes = |pair: &pair::StopPair<'_>| [pair.left.size, pair.right.size];
         let image_sizes = stops.further_pair(step, camera).ok().as_ref().map(sizes);
-        let (points, range) = match self.points(stops, (camera, step), cancel) {
+        let (points, range) = match self.points(stops, (camera, step), cancel)? {
             Ok(points) => {
                 let range = RangeData::Points(points.len());
                 (points, range)
             }
-            Err(Error::Cancelled) => return Err(Error::Cancelled),
-            Err(error) => (Vec::new(), RangeData::Missing(error.to_string())),
+            Err(why) => (Vec::new(), RangeData::Missing(why)),
         };
         let site_from_rover = stops.site_from_rover(step);
         let moved = self.stops.last().map_or(0.0, |before| {
@@ -217,14 +216,25 @@ impl HazardMaps {
         Ok(())
     }
 
+    /// The points of a stop, or why there are none.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`], and images that cannot be read or written: they may come at the next attempt.
     fn points(
         &self,
         stops: &dyn Stops,
         (camera, step): (CameraName, usize),
         cancel: Cancel<'_>,
-    ) -> Result<Vec<Point3>> {
-        let pair = stops.further_pair(step, camera)?;
+    ) -> Result<Result<Vec<Point3>, String>> {
+        let pair = match stops.further_pair(step, camera) {
+            Ok(pair) => pair,
+            Err(error) => return Ok(Err(error.to_string())),
+        };
         let images = stops.capture_further(step, camera, cancel)?;
-        range_points([&images.left, &images.right], [pair.left, pair.right], &self.settings, cancel)
+        match range_points([&images.left, &images.right], [pair.left, pair.right], &self.settings, cancel) {
+            Ok(points) => Ok(Ok(points)),
+            Err(Error::Cancelled) => Err(Error::Cancelled),
+            Err(error) => Ok(Err(error.to_string())),
+        }
     }
 }

@@ -15,7 +15,7 @@ use crate::visual_odometry::OdometryMode;
 /// Longest step and largest turn that odometry follows, m and rad (driving.md 1: 75 cm, 18°).
 const STEP_MAX_M: f64 = 0.75;
 const TURN_MAX_RAD: f64 = 18.0 * std::f64::consts::PI / 180.0;
-/// Slip either way that the next step makes good.
+/// Largest slip, of either sign, that the next step compensates.
 const SLIP_MADE_GOOD: f64 = 0.5;
 /// Shortest part of a step, where the slip left less of it, m.
 const PART_MIN_M: f64 = 0.1;
@@ -39,7 +39,9 @@ pub(super) fn choose(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &mut Cycl
     let choice = input.navigator.select_path(&path_input);
     match choice.motion() {
         Some(motion) => {
-            let (motion, is_part) = followable(motion, input.command, slip_to(stops, cycle.step));
+            // On a map the rover drives no farther than the path was judged.
+            let slip = slip_to(stops, cycle.step).filter(|_| map.is_none());
+            let (motion, is_part) = followable(motion, input.command, slip);
             cycle.motion = Some(motion);
             cycle.odometry_alone = is_part && input.command.tracked_stops == TrackedStops::ByDistance;
         }

@@ -75,7 +75,7 @@ pub enum Failure {
         limit_rad: f64,
     },
     /// The shape lets the target slide.
-    #[error("the registered surface leaves the target uncertain {}; the limit is {limit_m:.3} m", sigma_text(.sigma_m))]
+    #[error("target uncertainty after registration: {}; the limit is {limit_m:.3} m", sigma_text(.sigma_m))]
     NotEnoughShape {
         /// 1σ in the weakest direction, m; none where nothing holds it.
         sigma_m: Option<f64>,
@@ -113,5 +113,6 @@ pub enum Failure {
 }
 
 fn sigma_text(sigma_m: &Option<f64>) -> String {
-    sigma_m.map_or_else(|| "without bound".to_owned(), |sigma_m| format!("by {sigma_m:.3} m"))
+    sigma_m
+        .map_or_else(|| "unlimited along one direction".to_owned(), |sigma_m| format!("{sigma_m:.3} m (1σ)"))
 }

@@ -30,6 +30,9 @@ use crate::{driving, theme};
 /// How near to a stop a click must be to go there, points.
 const CLICK_REACH: f32 = 14.0;
 
+/// Height of the panel from which the rows of names are shown; below it the map has all room, points.
+const NAMES_FROM: f32 = 190.0;
+
 /// Room between the two maps, points.
 const GAP: f32 = 8.0;
 
@@ -63,7 +66,9 @@ fn driven(state: &State) -> Option<&[StopView]> {
 /// Shows the map.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let Some(stops) = driven(state) else { return };
-    names::wrapped(ui, "", &names_of(state, stops));
+    if ui.available_height() >= NAMES_FROM {
+        names::wrapped(ui, "", &names_of(state, stops));
+    }
     let run = state.run().filter(|run| !run.rows.is_empty());
     let Some(run) = run else {
         drive(ui, state, stops, None, out);
@@ -164,10 +169,15 @@ fn names_of(state: &State, stops: &[StopView]) -> Vec<(Mark, Color32, String)> {
         names.push((Mark::Stroke(overlay::Line::Dashed), theme::accent(), "planned".to_owned()));
         names.push((Mark::Stroke(overlay::Line::Dashed), theme::weak(), "by wheels alone, 3σ".to_owned()));
     }
+    if state.cycle_at(state.cursor.step).is_some_and(|cycle| cycle.choice.is_some()) {
+        names.push((Mark::Stroke(overlay::Line::Dotted), theme::prediction(), "route".to_owned()));
+        names.push((Mark::Stroke(overlay::Line::Solid), theme::score(1.0), "path by its vote".to_owned()));
+        names.push((Mark::Stroke(overlay::Line::Dotted), theme::failed(), "vetoed path".to_owned()));
+        names.push((Mark::Cross, theme::failed(), "first failing cell".to_owned()));
+    }
     if let Some(raster) = state.hazards().ready() {
         names.push((Mark::Square, theme::goodness(100), "good ground".to_owned()));
         names.push((Mark::Square, theme::goodness(0), "bad ground".to_owned()));
-        names.push((Mark::Stroke(overlay::Line::Dotted), theme::failed(), "vetoed path".to_owned()));
         if let Some(why) = &raster.view.missing {
             names.push((Mark::Square, theme::lost(), format!("no range data here: {why}")));
         }

@@ -144,14 +144,14 @@ impl Tracker for CombinedTracker {
 
     fn locate(&self, input: &LocateInput<'_>, memory: &CombinedMemory) -> Sighting<ShapeEvidence> {
         if input.place.is_hand_over {
-            let why = "the target is handed over to other cameras here".to_owned();
+            let why = "hand-off to other cameras at this stop".to_owned();
             return locate(input, &memory.views, None, Some(why.clone()), why);
         }
         let by_features = FeatureTracker.locate(input, &memory.features);
         let is_lost =
             by_features.position_in_rover.is_none() || by_features.confidence < least_confidence(input);
         let asked = match input.settings.shape.shape_use {
-            _ if input.place.is_last_of_pair => Some("this is the last stop with these cameras"),
+            _ if input.place.is_last_of_pair => Some("last stop with these cameras"),
             ShapeUse::EveryStop => Some("the surface is registered at every stop"),
             ShapeUse::WhenLost if is_lost => Some("the features lost the target"),
             ShapeUse::AtEnd | ShapeUse::WhenLost => None,
