@@ -70,7 +70,8 @@ impl Scene {
 
     fn hazards(&self, points: &[Point3], before: Option<&HazardMap>) -> HazardMap {
         let site_from_rover = self.world.traverse().site_from_rover(0);
-        let scan = Scan { points_in_rover: points, site_from_rover: &site_from_rover, driven_m: 0.0 };
+        let scan =
+            Scan { points_in_rover: points, site_from_rover: &site_from_rover, driven_m: 0.0, noise: None };
         map_hazards(before, &scan, &self.settings)
     }
 

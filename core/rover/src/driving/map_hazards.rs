@@ -18,7 +18,7 @@ use sightline_track::trace::StepTrace;
 
 use super::command::DriveCommand;
 use crate::hazards::{
-    GoodnessMap, HazardMap, HazardSettings, MapRules, Scan, assess, map_hazards, range_points,
+    GoodnessMap, HazardMap, HazardSettings, MapRules, Scan, assess, map_hazards, range_noise, range_points,
 };
 use crate::pair::{self, FurtherCamera};
 use crate::pipeline::Stops;
@@ -209,8 +209,14 @@ impl HazardMaps {
             moved.x.hypot(moved.y)
         });
         self.driven_m += moved;
-        let scan =
-            Scan { points_in_rover: &points, site_from_rover: &site_from_rover, driven_m: self.driven_m };
+        let noise = stops.further_pair(step, camera).ok();
+        let noise = noise.and_then(|pair| range_noise([pair.left, pair.right], &self.settings));
+        let scan = Scan {
+            points_in_rover: &points,
+            site_from_rover: &site_from_rover,
+            driven_m: self.driven_m,
+            noise,
+        };
         self.map = Some(map_hazards(self.map.as_ref(), &scan, &self.settings));
         self.stops.push(Mapped { site_from_rover, range, image_sizes, assessed: None });
         Ok(())

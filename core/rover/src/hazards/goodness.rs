@@ -213,10 +213,8 @@ impl GoodnessCell {
 pub fn assess(map: &HazardMap, rules: &MapRules, settings: &HazardSettings) -> GoodnessMap {
     let [disc, reach] = [settings.rover_radius_m, settings.step_reach_m]
         .map(|radius_m| Disc::new(radius_m / map.grid.cell_m));
-    let (sums, steps) = rayon::join(
-        || disc_sums(map, &disc, settings.weight_min),
-        || steps(map, &disc, &reach, settings.weight_min),
-    );
+    let (sums, steps) =
+        rayon::join(|| disc_sums(map, &disc, settings.weight_min), || steps(map, &disc, &reach, settings));
     let cells = sums
         .par_iter()
         .zip(&steps)

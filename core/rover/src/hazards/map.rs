@@ -29,6 +29,29 @@ pub struct Scan<'a> {
     pub site_from_rover: &'a Pose,
     /// Distance driven since the first stop, m.
     pub driven_m: f64,
+    /// The error of the points; `None`: they are exact.
+    pub noise: Option<RangeNoise>,
+}
+
+/// The error of a stereo pair's range, and so of the height of a point.
+///
+/// ```text
+/// σ_range = R² σ_d / (f B)      σ_height = σ_range |h| / R
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RangeNoise {
+    /// Position of the left camera, rover frame, m.
+    pub camera_in_rover: Point3,
+    /// σ_d/(f B): 1σ of the disparity over focal length and baseline, 1/m.
+    pub per_m: f64,
+}
+
+impl RangeNoise {
+    /// Variance of the height of a point, rover frame, m².
+    fn height_variance_m2(&self, point_in_rover: &Point3) -> f64 {
+        let from_camera = point_in_rover - self.camera_in_rover;
+        (self.per_m * from_camera.norm() * from_camera.z).powi(2)
+    }
 }
 
 /// Hazard map of a drive: everything that the next stop needs of the stops before.
@@ -90,12 +113,13 @@ impl HazardMap {
             if -point.z > settings.height_max_m {
                 continue;
             }
+            let variance_m2 = scan.noise.map_or(0.0, |noise| noise.height_variance_m2(point));
             let point = scan.site_from_rover * point;
             let Some([row, column]) = self.grid.cell_at([point.x, point.y]) else { continue };
             let centre = self.grid.centre_m(row * self.grid.side + column);
             let relative = [point.x - centre[0], point.y - centre[1], point.z - self.height_m];
             let slot = self.grid.slot(row, column);
-            self.cells[slot].add(relative, scan.driven_m);
+            self.cells[slot].add(relative, scan.driven_m, variance_m2);
         }
     }
 }

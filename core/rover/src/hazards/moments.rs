@@ -9,15 +9,16 @@
 //! | n | number of points, decayed with the distance driven | – |
 //! | x, y, z | position from a reference of the sums, z down | m |
 //! | – | `odometer`: Σ distance driven at the observation | m |
+//! | σ² | expected variance of a point's height | m² |
 //!
 //! Frame: axes of the site. Source: domain.md 8.2; the normal equations are those of least squares.
 
 use serde::{Deserialize, Serialize};
 
 /// Number of sums.
-pub(super) const SUMS: usize = 11;
+pub(super) const SUMS: usize = 12;
 
-/// n, Σx, Σy, Σz, Σx², Σxy, Σxz, Σy², Σyz, Σz² and Σ of the distance driven at the observation.
+/// n, Σx, Σy, Σz, Σx², Σxy, Σxz, Σy², Σyz, Σz², Σ of the distance driven at the observation, and Σσ².
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Moments(pub(super) [f64; SUMS]);
 
@@ -34,10 +35,10 @@ pub(super) struct Plane {
 const SCATTER_MIN: f64 = 1e-3;
 
 impl Moments {
-    /// Adds a point that was seen when the rover had driven `odometer_m`.
+    /// Adds a point whose height has this variance, m², and that was seen when the rover had driven `odometer_m`.
     #[inline]
-    pub(super) fn add(&mut self, [x, y, z]: [f64; 3], odometer_m: f64) {
-        let added = [1.0, x, y, z, x * x, x * y, x * z, y * y, y * z, z * z, odometer_m];
+    pub(super) fn add(&mut self, [x, y, z]: [f64; 3], odometer_m: f64, variance_m2: f64) {
+        let added = [1.0, x, y, z, x * x, x * y, x * z, y * y, y * z, z * z, odometer_m, variance_m2];
         for (sum, value) in self.0.iter_mut().zip(added) {
             *sum += value;
         }
@@ -59,9 +60,15 @@ impl Moments {
         self.0[3] / self.0[0]
     }
 
+    /// The mean expected variance of the heights, m²: errors of neighbouring points are alike, so that their number does not
+    /// reduce it. Not finite without points.
+    pub(super) fn variance_m2(&self) -> f64 {
+        self.0[11] / self.0[0]
+    }
+
     /// The same sums about a reference that is `x`, `y` before this one.
     pub(super) fn shifted(&self, x: f64, y: f64) -> Self {
-        let [n, sx, sy, sz, sxx, sxy, sxz, syy, syz, szz, odometer] = self.0;
+        let [n, sx, sy, sz, sxx, sxy, sxz, syy, syz, szz, odometer, variance] = self.0;
         Self([
             n,
             sx + n * x,
@@ -74,12 +81,13 @@ impl Moments {
             syz + y * sz,
             szz,
             odometer,
+            variance,
         ])
     }
 
     /// The plane through the points; `None` for points on a line, or fewer than three.
     pub(super) fn plane(&self) -> Option<Plane> {
-        let [n, sx, sy, sz, sxx, sxy, sxz, syy, syz, szz, _] = self.0;
+        let [n, sx, sy, sz, sxx, sxy, sxz, syy, syz, szz, ..] = self.0;
         let scatter = |product: f64, a: f64, b: f64| product - a * b / n;
         let (xx, xy, yy) = (scatter(sxx, sx, sx), scatter(sxy, sx, sy), scatter(syy, sy, sy));
         let (xz, yz, zz) = (scatter(sxz, sx, sz), scatter(syz, sy, sz), scatter(szz, sz, sz));
@@ -107,7 +115,7 @@ mod tests {
             for k in 0..200 {
                 let (x, y) = (0.04 * f64::from(k % 20) - 0.4, 0.07 * f64::from(k / 20));
                 let z = slope * (x * direction.cos() + y * direction.sin()) + 1.7;
-                moments.add([x, y, z], 0.0);
+                moments.add([x, y, z], 0.0, 0.0);
             }
             for reference in [[0.0, 0.0], [7.0, -8.0]] {
                 let plane = moments.shifted(reference[0], reference[1]).plane().unwrap();
@@ -125,7 +133,7 @@ mod tests {
             // A chequered offset is uncorrelated with x and y.
             let offset = if (column + row) % 2 == 0 { 0.03 } else { -0.03 };
             let (x, y) = (0.05 * f64::from(column), 0.05 * f64::from(row));
-            moments.add([x, y, 0.2 * x - 0.1 * y + offset], 0.0);
+            moments.add([x, y, 0.2 * x - 0.1 * y + offset], 0.0, 0.0);
         }
         let plane = moments.plane().unwrap();
         assert!((plane.roughness_m - 0.03).abs() < 2e-4, "{plane:?}");
@@ -137,7 +145,7 @@ mod tests {
         assert!(moments.plane().is_none());
         for k in 0..50 {
             let x = 0.02 * f64::from(k);
-            moments.add([x, 0.5 * x, 0.1 * x], 0.0);
+            moments.add([x, 0.5 * x, 0.1 * x], 0.0, 0.0);
         }
         assert!(moments.plane().is_none());
     }

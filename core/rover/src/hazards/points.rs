@@ -8,13 +8,29 @@
 use sightline_geometry::camera::Camera;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
-use sightline_geometry::frames::Point3;
+use sightline_geometry::frames::{Pixel, Point3};
 use sightline_vision::image::GrayImage;
 use sightline_vision::stereo::dense_stereo_until;
 
+use super::map::RangeNoise;
 use super::settings::HazardSettings;
 use crate::visual_odometry::reduce::Reduced;
 use crate::visual_odometry::windows::Eye;
+
+/// The error of the points of a stereo pair; `None` for a camera that sees nothing at its centre.
+pub fn range_noise(cameras: [&Camera; 2], settings: &HazardSettings) -> Option<RangeNoise> {
+    let [left, right] = cameras;
+    let centre = Pixel::new(0.5 * f64::from(left.size[0] - 1), 0.5 * f64::from(left.size[1] - 1));
+    let focal_px = left.model.focal_length_px(centre)? / f64::from(reduction(left, settings));
+    let baseline_m = (right.model.centre() - left.model.centre()).norm();
+    let per_m = settings.disparity_sigma_px / (focal_px * baseline_m);
+    Some(RangeNoise { camera_in_rover: left.model.centre(), per_m }).filter(|noise| noise.per_m.is_finite())
+}
+
+/// How many times smaller the images are made before stereo.
+fn reduction(left: &Camera, settings: &HazardSettings) -> u32 {
+    left.size[0].div_ceil(settings.range_width_px).max(1)
+}
 
 /// The points that a stereo pair shows, rover frame, m, row by row of the left image, without those of the rover itself.
 ///
@@ -31,7 +47,7 @@ pub fn range_points(
             return Err(Error::Request("an image of the pair is not as large as its camera says".to_owned()));
         }
     }
-    let factor = cameras[0].size[0].div_ceil(settings.range_width_px).max(1);
+    let factor = reduction(cameras[0], settings);
     let stereo = settings.stereo();
     let dense = if factor == 1 {
         dense_stereo_until(images, cameras, &stereo, cancel)?

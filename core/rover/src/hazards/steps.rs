@@ -1,14 +1,15 @@
 //! Steps: the largest difference of the mean heights of two cells near each other, both inside the disc.
 //!
 //! ```text
-//! step(p) = max |z̄(c) − z̄(c + o)|      c ∈ D_p ∩ (D_p − o),  0 < |o| ≤ reach
+//! step(p) = max (|z̄(c) − z̄(c + o)| − k √(σ²(c) + σ²(c + o)))      c ∈ D_p ∩ (D_p − o),  0 < |o| ≤ reach
 //! ```
 //! For each offset o the differences form one image, and the maximum over the intersection of both discs is taken row by
 //! row: a run of l cells is covered by two runs of 2^k ≤ l, whose maxima are computed once for the whole image.
 //!
 //! | symbol | meaning |
 //! |---|---|
-//! | z̄(c) | mean height of the points of cell c, m |
+//! | z̄(c), σ²(c) | mean height of the points of cell c, m, and its expected variance, m² |
+//! | k | `step_sigmas` |
 //! | D_p | disc of the rover's radius around cell p |
 //!
 //! Source: domain.md 8.2.
@@ -17,16 +18,22 @@ use rayon::prelude::*;
 
 use super::grid::Disc;
 use super::map::HazardMap;
+use super::settings::HazardSettings;
 
 /// The largest step in the disc around every cell, row by row, m; 0 where no two cells are known.
-pub(super) fn steps(map: &HazardMap, disc: &Disc, reach: &Disc, weight_min: f64) -> Vec<f32> {
+pub(super) fn steps(map: &HazardMap, disc: &Disc, reach: &Disc, settings: &HazardSettings) -> Vec<f32> {
     let side = map.grid.side;
     let heights: Vec<f32> = (0..side * side)
         .map(|index| {
             let cell = map.cell(index / side, index % side);
-            if cell.count() >= weight_min { cell.mean_height_m() as f32 } else { f32::NAN }
+            if cell.count() >= settings.weight_min { cell.mean_height_m() as f32 } else { f32::NAN }
         })
         .collect();
+    let k2 = settings.step_sigmas.powi(2);
+    let variances: Vec<f32> = (0..side * side)
+        .map(|index| (k2 * map.cell(index / side, index % side).variance_m2()) as f32)
+        .collect();
+    let cells = Cells { heights, variances, side };
     let offsets: Vec<[isize; 2]> = (0..=reach.rows())
         .flat_map(|row| {
             let half = reach.half_width(row).unwrap_or(-1);
@@ -40,7 +47,7 @@ pub(super) fn steps(map: &HazardMap, disc: &Disc, reach: &Disc, weight_min: f64)
         a
     };
     let nothing = || vec![0.0; side * side];
-    offsets.into_par_iter().map(|offset| largest(&heights, side, offset, disc)).reduce(nothing, larger)
+    offsets.into_par_iter().map(|offset| largest(&cells, offset, disc)).reduce(nothing, larger)
 }
 
 /// Replaces every value by the larger one of the two.
@@ -51,11 +58,19 @@ fn raise(values: &mut [f32], others: &[f32]) {
     }
 }
 
+/// The cells row by row: mean heights, m, NaN where unknown, and k² times their variances, m².
+struct Cells {
+    heights: Vec<f32>,
+    variances: Vec<f32>,
+    side: usize,
+}
+
 /// The largest difference over all pairs of one offset, in the disc around every cell.
-fn largest(heights: &[f32], side: usize, offset: [isize; 2], disc: &Disc) -> Vec<f32> {
+fn largest(cells: &Cells, offset: [isize; 2], disc: &Disc) -> Vec<f32> {
+    let side = cells.side;
     let margin = disc.rows() as usize;
     let width = side + 2 * margin;
-    let runs = Runs::new(differences(heights, side, offset, margin), width, margin);
+    let runs = Runs::new(differences(cells, offset, margin), width, margin);
     let mut steps = vec![0.0f32; side * side];
     for (row, steps) in steps.chunks_exact_mut(side).enumerate() {
         for beside in -disc.rows()..=disc.rows() {
@@ -75,8 +90,10 @@ fn largest(heights: &[f32], side: usize, offset: [isize; 2], disc: &Disc) -> Vec
     steps
 }
 
-/// |z̄(c) − z̄(c + o)| with a margin of zeros on both sides of every row; 0 if one of the cells is unknown.
-fn differences(heights: &[f32], side: usize, [down, along]: [isize; 2], margin: usize) -> Vec<f32> {
+/// By how much |z̄(c) − z̄(c + o)| exceeds its error, with a margin of zeros on both sides of every row; 0 if one of the cells is
+/// unknown.
+fn differences(cells: &Cells, [down, along]: [isize; 2], margin: usize) -> Vec<f32> {
+    let side = cells.side;
     let width = side + 2 * margin;
     let mut differences = vec![0.0f32; side * width];
     for (row, line) in differences.chunks_exact_mut(width).enumerate() {
@@ -84,14 +101,16 @@ fn differences(heights: &[f32], side: usize, [down, along]: [isize; 2], margin: 
         if other >= side {
             break;
         }
-        let (own, other) =
-            (&heights[row * side..(row + 1) * side], &heights[other * side..(other + 1) * side]);
         let from = (-along).max(0) as usize;
         let to = (side as isize - along.max(0)) as usize;
-        let partners = &other[(from as isize + along) as usize..];
+        // Cells from..to of the row, and their partners.
+        let own = row * side + from..row * side + to;
+        let partners = ((other * side + from) as isize + along) as usize..;
         let line = &mut line[margin + from..margin + to];
-        for ((difference, a), b) in line.iter_mut().zip(&own[from..to]).zip(partners) {
-            let height = (a - b).abs();
+        let a = cells.heights[own.clone()].iter().zip(&cells.variances[own]);
+        let b = cells.heights[partners.clone()].iter().zip(&cells.variances[partners]);
+        for (difference, ((a, a_variance), (b, b_variance))) in line.iter_mut().zip(a.zip(b)) {
+            let height = (a - b).abs() - (a_variance + b_variance).sqrt();
             *difference = if height > 0.0 { height } else { 0.0 };
         }
     }

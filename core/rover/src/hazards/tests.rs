@@ -31,7 +31,11 @@ fn mapped(
     settings: &HazardSettings,
 ) -> HazardMap {
     let in_rover: Vec<Point3> = points.iter().map(|p| site_from_rover.inverse_transform_point(p)).collect();
-    map_hazards(before, &Scan { points_in_rover: &in_rover, site_from_rover, driven_m }, settings)
+    map_hazards(
+        before,
+        &Scan { points_in_rover: &in_rover, site_from_rover, driven_m, noise: None },
+        settings,
+    )
 }
 
 fn assessed(height: impl Fn(f64, f64) -> f64) -> GoodnessMap {
@@ -55,6 +59,29 @@ fn a_tilted_plane_has_its_tilt_in_every_cell() {
             assert!(step <= 0.4 * slope + 1e-6 && step >= 0.34 * slope, "{step} {slope}");
         }
     }
+}
+
+#[test]
+fn a_step_is_what_exceeds_the_error_of_the_heights() {
+    let settings = HazardSettings::default();
+    let heights = |x: f64, y: f64| if x.abs() < 0.25 && y.abs() < 0.25 { -0.3 } else { 0.0 };
+    let points = points([0.0, 0.0], 1.0, 0.03, heights);
+    let step = |per_m: f64| {
+        // 100 m above level ground every height has nearly the same error.
+        let camera_in_rover = Point3::new(0.0, 0.0, -100.0);
+        let scan = Scan {
+            points_in_rover: &points,
+            site_from_rover: &pose(0.0, 0.0),
+            driven_m: 0.0,
+            noise: Some(RangeNoise { camera_in_rover, per_m }),
+        };
+        let map = assess(&map_hazards(None, &scan, &settings), &MapRules::default(), &settings);
+        f64::from(map.cell_at([0.0, 0.0]).unwrap().step_m)
+    };
+    assert!((step(0.0) - 0.3).abs() < 1e-6);
+    // 1σ of 5 cm each: 2σ of the difference are 14 cm.
+    assert!((step(5e-6) - (0.3 - 0.2 * 0.5f64.sqrt())).abs() < 2e-3, "{}", step(5e-6));
+    assert!(step(2e-5) < 1e-6, "within the error");
 }
 
 #[test]

@@ -60,7 +60,12 @@ impl Drive<'_> {
                 break;
             }
             let points = seen(&stance, self.view[0], self.view[1], |x, y| rocks_height(self.rocks, x, y));
-            let scan = Scan { points_in_rover: &points, site_from_rover: &stance, driven_m: driven.driven_m };
+            let scan = Scan {
+                points_in_rover: &points,
+                site_from_rover: &stance,
+                driven_m: driven.driven_m,
+                noise: None,
+            };
             let next = map_hazards(map.as_ref(), &scan, &settings);
             let goodness = assess(&next, &MapRules::at(origin, [0.0, 0.0], None, &settings), &settings);
             map = Some(next);

@@ -54,7 +54,7 @@ pub(super) fn seen(
 /// The map of a height function that is known all around.
 fn known(stance: &Pose, settings: &HazardSettings, height: impl Fn(f64, f64) -> f64) -> GoodnessMap {
     let points = seen(stance, 6.0, 4.0, height);
-    let scan = Scan { points_in_rover: &points, site_from_rover: stance, driven_m: 0.0 };
+    let scan = Scan { points_in_rover: &points, site_from_rover: stance, driven_m: 0.0, noise: None };
     assess(&map_hazards(None, &scan, settings), &MapRules::default(), settings)
 }
 
@@ -121,7 +121,7 @@ fn unknown_ground_is_vetoed_with_its_share() {
     let stance = pose([0.0, 0.0], 0.0);
     let settings = HazardSettings::default();
     let points = seen(&stance, 1.0, 4.0, |_, _| 0.0);
-    let scan = Scan { points_in_rover: &points, site_from_rover: &stance, driven_m: 5.0 };
+    let scan = Scan { points_in_rover: &points, site_from_rover: &stance, driven_m: 5.0, noise: None };
     let hazards = map_hazards(None, &scan, &settings);
     let map = assess(&hazards, &MapRules::default(), &settings);
     let choice = select(NavigatorPreset::Gestalt, &map, &stance, [5.0, 0.0], 1.5);
@@ -238,7 +238,8 @@ fn old_data_count_less_for_morphin_than_for_gestalt() {
     let stance = pose([0.0, 0.0], 0.0);
     let settings = HazardSettings::default();
     let points = seen(&stance, 5.0, 4.0, |_, _| 0.0);
-    let scan = |driven_m: f64| Scan { points_in_rover: &points, site_from_rover: &stance, driven_m };
+    let scan =
+        |driven_m: f64| Scan { points_in_rover: &points, site_from_rover: &stance, driven_m, noise: None };
     let first = map_hazards(None, &scan(0.0), &settings);
     let nothing = Scan { points_in_rover: &[], ..scan(5.0) };
     let old = map_hazards(Some(&first), &nothing, &settings);
