@@ -30,7 +30,7 @@ fn scenario() -> Scenario {
 
 fn command(navigator: NavigatorKind) -> DriveCommand {
     // The small images are for the hazard map: tracking has no influence.
-    DriveCommand { navigator, goal: GoalRule::Fixed, stops_max: 40, ..DriveCommand::default() }
+    DriveCommand { navigator, goal: GoalRule::Fixed, stops_max: 60, ..DriveCommand::default() }
 }
 
 fn begin(scenario: &Scenario, command: DriveCommand, folder: &Path) -> Result<TargetedDrive, String> {

@@ -179,7 +179,7 @@ impl GoodnessCell {
         }
         let known = sums.known / disc.count() as f64;
         let certainty = (count / settings.points_full).min(1.0) * known;
-        let age_m = driven_m - sums.moments.0[super::moments::SUMS - 1] / count;
+        let age_m = driven_m - sums.moments.odometer_m() / count;
         let cell = Self { step_m, certainty: certainty as f32, age_m: age_m as f32, ..Self::default() };
         let Some(plane) = sums.moments.plane() else { return cell };
         let mut cell = Self {

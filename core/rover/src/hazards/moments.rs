@@ -60,6 +60,12 @@ impl Moments {
         self.0[3] / self.0[0]
     }
 
+    /// The sum of the distances driven at the observations, m.
+    #[inline]
+    pub(super) fn odometer_m(&self) -> f64 {
+        self.0[10]
+    }
+
     /// The mean expected variance of the heights, m²: errors of neighbouring points are alike, so that their number does not
     /// reduce it. Not finite without points.
     pub(super) fn variance_m2(&self) -> f64 {

@@ -42,11 +42,11 @@ settings_group! {
         /// Nearest range of the stereo pair.
         range_min_m: f64 = 0.4, "m", Domain::Between(0.1, 10.0), "ours";
         /// Points farther from the left camera are left out: their error is larger than the terms.
-        range_max_m: f64 = 5.0, "m", Domain::Between(1.0, 100.0), "ours";
+        range_max_m: f64 = 3.5, "m", Domain::Between(1.0, 100.0), "ours";
         /// 1σ of the disparity of a point: its height is that uncertain, and steps must exceed what follows from it.
         disparity_sigma_px: f64 = 0.25, "px", Domain::Between(0.0, 5.0), "ours; Kim09 §4.2 has 1/3";
         /// By so many 1σ of their heights' difference two cells must differ, before the rest counts as a step.
-        step_sigmas: f64 = 2.0, "", Domain::Between(0.0, 10.0), "ours";
+        step_sigmas: f64 = 1.0, "", Domain::Between(0.0, 10.0), "ours";
         /// Least slope of the image for a match, fraction of full scale per px. Too low: points in the sky; too high: holes.
         range_texture_min: f64 = 0.003, "1/px", Domain::Between(0.0, 0.1), "ours; docs/driving.md";
         /// Share by which the best match must be better than any other.
