@@ -4,6 +4,7 @@
 //! descriptions of scenarios, and the text of the page's HTML. Left out are tests, panics, keys and identifiers, scripts
 //! and markup. For reviewers of the language, and for the rule that no such text quotes a requirement by its number.
 
+mod sources;
 mod text;
 
 use std::collections::BTreeSet;
@@ -14,6 +15,7 @@ use proc_macro2::{Delimiter, Group, TokenStream, TokenTree};
 
 use crate::cmd;
 use crate::house_rules::{Finding, files, read};
+use sources::{folder_of_modules, is_of_tests};
 use text::{is_for_users, quotes_requirement, texts_of_page};
 
 /// Folders of crates without a text for users.
@@ -122,20 +124,6 @@ fn texts(root: &Path) -> Result<Vec<Text>> {
         found.extend(texts.into_iter().map(|(line, text)| Text { file: file.clone(), line, text }));
     }
     Ok(found)
-}
-
-/// True for a file whose name or folder says that it has tests.
-fn is_of_tests(file: &Path) -> bool {
-    let is_folder = file.components().any(|part| part.as_os_str() == "tests");
-    is_folder || file.file_stem().is_some_and(|name| name.to_string_lossy().ends_with("tests"))
-}
-
-/// The folder with the files of the modules that a file declares.
-fn folder_of_modules(file: &Path) -> PathBuf {
-    match file.file_stem().and_then(|name| name.to_str()) {
-        Some("mod" | "lib" | "main") => file.parent().unwrap_or(file).to_owned(),
-        _ => file.with_extension(""),
-    }
 }
 
 /// Whether doc comments are texts for users.

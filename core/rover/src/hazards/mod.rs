@@ -31,5 +31,6 @@ mod tests;
 pub use goodness::{CellBasis, Circle, GoodnessCell, GoodnessMap, HazardTerm, MapRules, assess};
 pub use grid::Grid;
 pub use map::{HazardMap, RangeNoise, Scan, map_hazards};
-pub use points::{range_noise, range_points};
+pub(crate) use points::range_noise;
+pub use points::range_points;
 pub use settings::HazardSettings;

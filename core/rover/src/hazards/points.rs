@@ -18,7 +18,7 @@ use crate::visual_odometry::reduce::Reduced;
 use crate::visual_odometry::windows::Eye;
 
 /// The error of the points of a stereo pair; `None` for a camera that sees nothing at its centre.
-pub fn range_noise(cameras: [&Camera; 2], settings: &HazardSettings) -> Option<RangeNoise> {
+pub(crate) fn range_noise(cameras: [&Camera; 2], settings: &HazardSettings) -> Option<RangeNoise> {
     let [left, right] = cameras;
     let centre = Pixel::new(0.5 * f64::from(left.size[0] - 1), 0.5 * f64::from(left.size[1] - 1));
     let focal_px = left.model.focal_length_px(centre)? / f64::from(reduction(left, settings));
