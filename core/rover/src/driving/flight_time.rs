@@ -47,7 +47,7 @@ pub struct FlightTime {
     pub drive_s: f64,
 }
 
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
 fn is_zero(value_s: &f64) -> bool {
     *value_s == 0.0
 }
