@@ -260,7 +260,7 @@ fn buttons(ui: &mut Ui, state: &State, drive: &DriveView, out: &mut Vec<Command>
 fn standing(ui: &mut Ui, drive: &DriveView) {
     let ending = drive.cycles.last().and_then(|cycle| cycle.ending.as_ref());
     let (text, colour) = match (ending, drive.is_driving, drive.paused) {
-        (Some(ending), ..) => (words::ending(&ending), theme::verdict(ending.reason == StopReason::Arrived)),
+        (Some(ending), ..) => (words::ending(ending), theme::verdict(ending.reason == StopReason::Arrived)),
         (None, true, _) => ("drives".to_owned(), theme::text()),
         (None, false, Some(halt)) => (pause::in_words(halt), theme::accent()),
         (None, false, None) => ("waits".to_owned(), theme::text()),

@@ -48,7 +48,7 @@ fn missing(state: &State, stage: Stage) -> String {
     }
     match state.cycle_at(step) {
         Some(cycle) if stage == Stage::DRIVE => match (cycle.ending.as_ref(), cycle.motion) {
-            (Some(ending), _) => format!("The rover did not drive from here: {}.", words::ending(&ending)),
+            (Some(ending), _) => format!("The rover did not drive from here: {}.", words::ending(ending)),
             (None, None) => "The rover stays here for another pair of images.".to_owned(),
             (None, Some(_)) => "The rover has not driven from here yet.".to_owned(),
         },
