@@ -8,7 +8,7 @@ use sightline_geometry::cancel::Cancel;
 use sightline_recordings::DrivenTraverse;
 use sightline_rover::driving::executive::{self, CycleInput};
 use sightline_rover::driving::{
-    Cycle, DriveCommand, GoalRule, NavigatorKind, RangeData, StopHazards, StopReason,
+    Cycle, DriveCommand, GoalRule, NavigatorKind, PathChoice, RangeData, StopHazards, StopReason,
 };
 use sightline_rover::hazards::CellBasis;
 use sightline_session::driving::TargetedDrive;
@@ -63,7 +63,7 @@ fn the_map_leads_round_a_rock_that_stalls_an_arc_and_a_resumed_drive_too() {
     let summary = gestalt.summary();
     println!("{summary:?}");
     assert_eq!((summary.reason, summary.collisions), (Some(StopReason::Arrived), 0));
-    let vetoed = |cycle: &Cycle| cycle.choice.as_ref().map_or(0, |choice| choice.vetoed_count());
+    let vetoed = |cycle: &Cycle| cycle.choice.as_ref().map_or(0, PathChoice::vetoed_count);
     assert!(gestalt.cycles.iter().any(|cycle| vetoed(cycle) > 0));
 
     // Once more up to the middle, then from the folder.
