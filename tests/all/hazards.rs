@@ -36,8 +36,8 @@ async fn the_map_of_a_stop_has_the_rock_for_which_paths_were_vetoed() {
         |drive: &Value| drive["cycles"].as_array().unwrap().iter().any(|one| !vetoes(one).is_empty());
     let driven = waited(&server, session, is_vetoed).await;
     let cycles = driven["cycles"].as_array().unwrap();
-    let with_vetoes = cycles.iter().map(vetoes).enumerate();
-    let (step, vetoed) = with_vetoes.filter(|(_, vetoed)| !vetoed.is_empty()).next_back().unwrap();
+    let mut with_vetoes = cycles.iter().map(vetoes).enumerate();
+    let (step, vetoed) = with_vetoes.rfind(|(_, vetoed)| !vetoed.is_empty()).unwrap();
 
     let map = server.get(&format!("sessions/{session}/drive/steps/{step}/hazards")).await.expect(200);
     let side = map["side"].as_u64().unwrap() as usize;
