@@ -42,7 +42,7 @@ pub enum NavigatorKind {
     /// The arc or turn to the goal, without a hazard map.
     #[default]
     Arcs,
-    /// Avoids the hazards of a goodness map: votes of hazard, goal and steering [R9].
+    /// Avoids the hazards of a goodness map: votes of hazard, goal and steering.
     Gestalt,
     /// Avoids the hazards of a goodness map: goodness and certainty integrated under the path.
     Morphin,

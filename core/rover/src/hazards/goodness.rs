@@ -12,8 +12,8 @@
 //! | s, s_seen | distance driven, and that at the observation of a point | m |
 //!
 //! A cell of less certainty than `certainty_min` is unknown, and so is one whose points are on a line. Cells within
-//! `exemption_radius_m` of the target are exempt [R100]. Unknown cells near the start of the drive are assumed to be good until
-//! the rover is `start_distance_m` from it [R102].
+//! `exemption_radius_m` of the target are exempt (R100). Unknown cells near the start of the drive are assumed to be good until
+//! the rover is `start_distance_m` from it (R102).
 //!
 //! Frame: site. Source: domain.md 8.2.
 
@@ -98,9 +98,9 @@ pub struct Circle {
 /// Circles in which cells count as good in spite of the data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MapRules {
-    /// All cells near the target [R100].
+    /// All cells near the target (R100).
     pub exemption: Option<Circle>,
-    /// Unknown cells near the start [R102].
+    /// Unknown cells near the start (R102).
     pub start: Option<Circle>,
 }
 

@@ -1,7 +1,7 @@
 //! Range data of a stereo pair: the points that its dense stereo finds, after a reduction of the images.
 //!
 //! Any pair that can be aligned serves: the hazcams (CAHVORE) or a wedge of the mast cameras. Two wedges are two lists of points,
-//! one after the other [R101].
+//! one after the other (R101).
 //!
 //! Frame: that of the cameras (rover), m.
 

@@ -1,7 +1,7 @@
 //! Settings of the hazard map: unit, default, range and source of each.
 //!
 //! A term is good up to `…_ok_…` and worst from `…_bad_…` on; between them its goodness falls linearly (`goodness.rs`).
-//! Sources: domain.md 8.2, whose values marked [M] are those commonly reported for MER.
+//! Sources: domain.md 8.2, whose values marked “M” are those commonly reported for MER.
 
 use sightline_geometry::error::{Error, Result};
 use sightline_track::limits::Domain;

@@ -11,7 +11,7 @@ use sightline_track::settings_group;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum NavigatorPreset {
-    /// Votes of hazard, goal and steering; the worst cell under a path counts as much as the mean [R9].
+    /// Votes of hazard, goal and steering; the worst cell under a path counts as much as the mean (R9).
     #[default]
     Gestalt,
     /// Goodness and certainty integrated under the path, old data discounted; an arbiter adds the goal.
