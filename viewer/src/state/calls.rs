@@ -28,7 +28,7 @@ impl State {
         take: impl FnOnce(&mut Self, E::Reply) + 'static,
         refused: impl FnOnce(&mut Self, &Problem) -> Notice + 'static,
     ) {
-        // What is tried again, with another value as a rule, says anew what is wrong with it.
+        // A retry supersedes the earlier refusal.
         if call.method != Method::Get {
             self.messages.mended(&format!("{} {}", call.method, call.path));
         }

@@ -66,8 +66,8 @@ impl Moments {
         self.0[10]
     }
 
-    /// The mean expected variance of the heights, m²: errors of neighbouring points are alike, so that their number does not
-    /// reduce it. Not finite without points.
+    /// The mean expected variance of the heights, m². It is not divided by the number of points, because stereo errors of
+    /// neighbouring points are correlated. Not finite without points.
     pub(super) fn variance_m2(&self) -> f64 {
         self.0[11] / self.0[0]
     }

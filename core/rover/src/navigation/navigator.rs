@@ -88,7 +88,7 @@ fn is_blocked(candidates: &[Candidate]) -> bool {
     candidates.iter().all(|candidate| candidate.veto.is_some())
 }
 
-/// The path with the best vote of those that may be driven; of equal ones the straighter one.
+/// The index of the path with the highest vote among those without a veto; of equal votes, the straighter path.
 fn best(candidates: &[Candidate]) -> Option<usize> {
     let bend = |candidate: &Candidate| candidate.motion.curvature_per_m().abs();
     let safe = candidates.iter().enumerate().filter(|(_, candidate)| candidate.veto.is_none());

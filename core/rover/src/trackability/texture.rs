@@ -16,7 +16,7 @@
 //! | σ_n | `noise` | full scale |
 //! | s | standard deviation of the window | full scale |
 //! | ρ | `step_score` | – |
-//! | k | `ALIKE`: neighbours that a step changes alike | – |
+//! | k | `ALIKE`: number of pixels whose changes over a step are correlated | – |
 
 use nalgebra::{Matrix2, Vector2};
 
@@ -28,7 +28,7 @@ use sightline_vision::correlate::zncc::zncc_surface;
 use sightline_vision::image::patch::Patch;
 use sightline_vision::image::{GrayImage, PixelRect, gradient};
 
-/// Neighbours that a step changes alike: three by three.
+/// Number of pixels whose changes over a step are correlated: three by three.
 const ALIKE: f64 = 9.0;
 
 /// The sensor's noise, 1σ, fraction of full scale; 0 for an image too small to tell.
