@@ -9,6 +9,8 @@ use sightline_tests::scenario::short_approach;
 #[tokio::test(flavor = "multi_thread")]
 async fn the_rover_drives_waits_goes_on_with_another_setting_arrives_and_branches() {
     let (bench, browser) = picked(&short_approach()).await;
+    // All buttons of the panel *Drive* are in view.
+    browser.resize(1600, 1200).await;
     let planned = browser.status().await["session"].as_str().unwrap().to_owned();
     browser.show_panel("Drive").await;
     browser.shot("drive-form").await;
