@@ -145,12 +145,12 @@ pub(crate) fn drive_on(
     let (command, navigator) = (&steering.command, &*steering.command.navigator.navigator());
     let mut maps = lock(&driven.maps);
     // Images may have to be rendered: the world is free meanwhile.
-    map_hazards(open, command, steps, &mut maps, cancel.as_ref().into())?;
+    map_hazards(open, command, (first, undecided(driven, steps)), &mut maps, cancel.as_ref().into())?;
     let mut world = lock(&driven.world);
     if world.traverse().stop_count() != last.step + 1 {
         return Ok(None);
     }
-    let before = driving::cycles(&world, command, &steps[..steps.len() - 1], &mut maps);
+    let before = driving::cycle_before(&world, command, &steps[..steps.len() - 1], &mut maps);
     let hazards = maps.at(world.traverse(), command, [&first.trace, &last.trace], cancel.as_ref().into())?;
     drop(maps);
     let input = executive::CycleInput {
@@ -158,7 +158,7 @@ pub(crate) fn drive_on(
         navigator,
         first: &first.trace,
         last: &last.trace,
-        before: before.last(),
+        before: before.as_ref(),
         hazards: hazards.as_deref(),
     };
     let state = world.state().to_vec();
@@ -180,18 +180,23 @@ pub(crate) fn drive_on(
     Ok(Some(Arc::new(open.grown(traverse))))
 }
 
-/// Computes the hazard maps of a run's stops that are missing, without the world.
+/// The last steps of a run, from the first that the rover has not driven on from.
+fn undecided<'a>(driven: &Driven, steps: &'a [Arc<RunStep>]) -> &'a [Arc<RunStep>] {
+    let count = driven.with(|world| steps.iter().take_while(|step| world.followed(step.step).is_some()).count());
+    &steps[count..]
+}
+
+/// Computes the hazard maps of a run's `steps` that are missing, without the world; its first step is that of the designation.
 ///
 /// # Errors
 /// [`Error::Cancelled`].
 fn map_hazards(
     open: &OpenTraverse,
     command: &DriveCommand,
-    steps: &[Arc<RunStep>],
+    (first, steps): (&RunStep, &[Arc<RunStep>]),
     maps: &mut HazardMaps,
     cancel: Cancel<'_>,
 ) -> Result<()> {
-    let Some(first) = steps.first() else { return Ok(()) };
     steps
         .iter()
         .try_for_each(|step| maps.at(&open.traverse, command, [&first.trace, &step.trace], cancel).map(drop))
@@ -289,8 +294,12 @@ pub(crate) fn view(live: &LiveSession) -> DriveView {
     };
     let is_driving = live.is_computing(steering.target, steering.run);
     let mut maps = lock(&driven.maps);
-    // Never cancelled.
-    let _mapped = map_hazards(&open, &steering.command, run.whole_steps(), &mut maps, Cancel::default());
+    let steps = run.whole_steps();
+    if let Some(first) = steps.first() {
+        let missing = (first.as_ref(), undecided(driven, steps));
+        // Never cancelled.
+        let _mapped = map_hazards(&open, &steering.command, missing, &mut maps, Cancel::default());
+    }
     driven.with(|world| DriveView::of(world, steering, &run, &mut maps, is_driving))
 }
 
@@ -314,12 +323,11 @@ pub(crate) fn hazards(live: &LiveSession, step: usize, cancel: &CancelFlag) -> A
     let (Some(first), Some(last)) = (steps.first(), steps.iter().find(|known| known.step == step)) else {
         return Err(ApiError::not_found(format!("The drive has not come to step {step}.")));
     };
-    let found = lock(&driven.maps).at(
-        &open.traverse,
-        command,
-        [&first.trace, &last.trace],
-        cancel.as_ref().into(),
-    )?;
+    let mut maps = lock(&driven.maps);
+    // All in turn: a map is that of the last stop before it is judged, and one who steps backwards asks for each.
+    map_hazards(&open, command, (first, steps), &mut maps, cancel.as_ref().into())?;
+    let found = maps.at(&open.traverse, command, [&first.trace, &last.trace], cancel.as_ref().into())?;
+    drop(maps);
     let none =
         || ApiError::not_found(format!("Step {step} has no hazard map: the drive has no pair for it."));
     found.map(|hazards| HazardView::of(&hazards)).ok_or_else(none)

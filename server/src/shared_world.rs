@@ -8,7 +8,7 @@ use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
 use sightline_geometry::frames::Pixel;
 use sightline_recordings::{DrivenTraverse, Traverse};
-use sightline_rover::driving::{ActiveWorld, DriveReport, Motion};
+use sightline_rover::driving::{ActiveWorld, DriveReport, FollowedCycle, Motion};
 use sightline_rover::pipeline::Stops;
 use sightline_rover::visual_odometry::MeasuredMotion;
 use sightline_track::locate::store::Cache;
@@ -51,6 +51,10 @@ impl ActiveWorld for SharedWorld<'_> {
 
     fn drive(&mut self, motion: &Motion, cancel: Cancel<'_>) -> Result<DriveReport> {
         self.change(|world| world.drive(motion, cancel))
+    }
+
+    fn keep_decision(&mut self, followed: &FollowedCycle<'_>) {
+        lock(self.world).keep_decision(followed);
     }
 
     fn stay(&mut self) -> Result<()> {

@@ -235,3 +235,42 @@ async fn what_cannot_be_driven_is_refused_in_a_sentence() {
     let refused = server.post(&format!("sessions/{session}/targets/0/runs/0/drive"), &json!({})).await;
     assert!(refused.problem(409, "conflict").contains("recorded drive"));
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn decisions_that_were_followed_stay_when_the_command_changes() {
+    let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
+    let server = TestServer::open(drive.path(), folder.path());
+    let far = json!({ "standoff_m": 4.5, "on_arrival": ["look"] });
+    let session = begin(&server, &json!({ "command": far, "pause_at": 2 })).await;
+    let waits = waited(&server, &session, waits_at(2)).await;
+    let followed = waits["cycles"].as_array().unwrap()[..2].to_vec();
+    assert!(followed.iter().all(|cycle| cycle["report"] != json!(null)));
+
+    // The rest of the way in shorter steps.
+    let path = format!("sessions/{session}/drive");
+    let short = json!({ "standoff_m": 4.5, "on_arrival": ["look"], "step_fraction": 0.07 });
+    let steering = json!({ "target": 0, "run": 0, "command": short });
+    server.json(Method::PUT, &path, &steering).await.expect(200);
+    let arrived = waited(&server, &session, has_ended).await;
+    let cycles = arrived["cycles"].as_array().unwrap();
+    assert_eq!(cycles[..2], followed);
+    assert_eq!(last_cycle(&arrived)["ending"]["reason"], "arrived");
+    assert_eq!(last_cycle(&arrived)["arrival_actions"], 1);
+
+    // A nearer goal is driven to, with a look of its own.
+    let near = json!({ "standoff_m": 4.0, "on_arrival": ["look"] });
+    let steering = json!({ "target": 0, "run": 0, "command": near });
+    server.json(Method::PUT, &path, &steering).await.expect(200);
+    let is_nearer = |drive: &Value| {
+        has_ended(drive) && drive["cycles"].as_array().unwrap().len() > cycles.len() + 1
+    };
+    let ended = waited(&server, &session, is_nearer).await;
+    let last = last_cycle(&ended);
+    assert_eq!((&last["ending"]["reason"], &last["arrival_actions"]), (&json!("arrived"), &json!(1)));
+    assert_eq!(ended["cycles"].as_array().unwrap()[..cycles.len() - 1], cycles[..cycles.len() - 1]);
+
+    // After a restart they are the same.
+    drop(server);
+    let server = TestServer::open(drive.path(), folder.path());
+    assert_eq!(waited(&server, &session, has_ended).await["cycles"], ended["cycles"]);
+}

@@ -2,10 +2,12 @@
 //!
 //! The folder is an ordinary simulated traverse, which can be opened and replayed at any time. `driven.json` beside the index
 //! is the state of the world ([`DrivenStop`] for each stop): [`DrivenTraverse::resume`] continues from it with the same bits.
+//! The decisions that were followed are kept beside it (`followed`).
 //!
 //! ```text
 //! scenario.toml   the world            traverse.toml   the stops driven to
 //! driven.json     the world's state    images/         rendered when first asked for
+//! decisions.json  what was followed
 //! ```
 
 use std::path::{Path, PathBuf};
@@ -14,7 +16,7 @@ use sightline_geometry::camera::{CameraName, MastAngles};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pixel;
-use sightline_rover::driving::{ActiveWorld, DriveReport, Motion, Stall};
+use sightline_rover::driving::{ActiveWorld, DriveReport, FollowedCycle, Motion, Stall};
 use sightline_rover::pipeline::Stops;
 use sightline_rover::visual_odometry::MeasuredMotion;
 use sightline_track::cycle_stage::CycleStage;
@@ -23,6 +25,7 @@ use sightline_world::traverse::View;
 use sightline_world::{SCENARIO_FILE, Scenario, World};
 
 use crate::files::{read_text, write_atomically};
+use crate::followed::{Decisions, Followed};
 use crate::index_file::{Existing, IndexFormat};
 use crate::native::{Traverse, write};
 
@@ -34,6 +37,7 @@ pub struct DrivenTraverse {
     traverse: Traverse,
     scenario: Scenario,
     driven: Vec<DrivenStop>,
+    decisions: Decisions,
 }
 
 impl DrivenTraverse {
@@ -64,7 +68,7 @@ impl DrivenTraverse {
         write(&index, folder, IndexFormat::Toml, Existing::Refuse)?;
         let traverse = Traverse::open(folder)?;
         traverse.keep_world(world);
-        let driven = Self { traverse, scenario: scenario.clone(), driven: vec![first] };
+        let driven = Self { traverse, scenario: scenario.clone(), driven: vec![first], decisions: Decisions::default() };
         driven.save()?;
         Ok(driven)
     }
@@ -98,7 +102,7 @@ impl DrivenTraverse {
         let simulated = self.traverse.simulated.as_ref().ok_or_else(no_simulation)?;
         let world = simulated.world_until(cancel)?.clone();
         let mut branch = Self::begin_in(world, &self.scenario, folder, cancel)?;
-        branch.restore(self.driven[..count].to_vec())?;
+        branch.replace(self.driven[..count].to_vec(), self.decisions.cut(count))?;
         for stop in &self.traverse.index().stops[..count] {
             for View { image: name, .. } in stop.views() {
                 // A missing image is rendered again with the same bits.
@@ -124,11 +128,12 @@ impl DrivenTraverse {
             return Err(Error::format(folder, "is no simulated drive, which alone can be continued"));
         };
         let scenario = simulated.scenario.clone();
-        let mut resumed = Self { traverse, scenario, driven: Vec::new() };
+        let decisions = Decisions::read(folder, driven.len())?;
+        let mut resumed = Self { traverse, scenario, driven: Vec::new(), decisions: Decisions::default() };
         if driven.is_empty() {
             return Err(Error::format(&path, "holds no stop"));
         }
-        resumed.restore(driven)?;
+        resumed.replace(driven, decisions)?;
         Ok(resumed)
     }
 
@@ -147,6 +152,15 @@ impl DrivenTraverse {
     /// # Errors
     /// A state without a stop, or files that cannot be written.
     pub fn restore(&mut self, state: Vec<DrivenStop>) -> Result<()> {
+        // A decision led to a place; what was done at the stop there is not part of it.
+        let is_driven_alike = |(one, other): &(&DrivenStop, &DrivenStop)| {
+            one.time_s == other.time_s && one.true_site_from_rover == other.true_site_from_rover
+        };
+        let alike = self.driven.iter().zip(&state).take_while(is_driven_alike).count();
+        self.replace(state, self.decisions.cut(alike))
+    }
+
+    fn replace(&mut self, state: Vec<DrivenStop>, decisions: Decisions) -> Result<()> {
         if state.is_empty() {
             return Err(Error::Request("a state of the world must have at least one stop".to_owned()));
         }
@@ -158,6 +172,7 @@ impl DrivenTraverse {
         self.forget_images(common, |_| true)?;
         self.traverse.truncate(common);
         self.driven = state;
+        self.decisions = decisions;
         for (number, stop) in index_stops(&self.driven, &self.scenario).into_iter().enumerate().skip(common) {
             self.traverse.put_stop(number, stop)?;
         }
@@ -167,6 +182,11 @@ impl DrivenTraverse {
     /// What the rover reports of the drive to a stop; `None` at the first stop and where there is none.
     pub fn report(&self, number: usize) -> Option<DriveReport> {
         self.driven.get(number).filter(|_| number > 0).map(report)
+    }
+
+    /// The decision at a stop that was followed to the next one; `None` at the last stop and where none is known.
+    pub fn followed(&self, number: usize) -> Option<&Followed> {
+        self.decisions.at(number)
     }
 
     /// The stops so far as a traverse of its own, which later stops do not change.
@@ -239,7 +259,8 @@ impl DrivenTraverse {
         write(self.traverse.index(), folder, IndexFormat::Toml, Existing::Replace)?;
         let text = serde_json::to_vec(&self.driven)
             .map_err(|error| Error::format(folder.join(STATE_FILE), error.to_string()))?;
-        write_atomically(&folder.join(STATE_FILE), &text)
+        write_atomically(&folder.join(STATE_FILE), &text)?;
+        self.decisions.write(folder)
     }
 
     /// Puts the last driven stop into the traverse.
@@ -283,6 +304,10 @@ impl ActiveWorld for DrivenTraverse {
         self.driven.push(next);
         self.put_last()?;
         Ok(report)
+    }
+
+    fn keep_decision(&mut self, followed: &FollowedCycle<'_>) {
+        self.decisions.keep(followed);
     }
 
     fn stay(&mut self) -> Result<()> {

@@ -7,6 +7,7 @@
 mod check;
 mod driven;
 pub mod files;
+mod followed;
 mod images;
 pub mod import;
 mod index_file;
@@ -20,6 +21,7 @@ mod truth_files;
 mod with_odometry;
 
 pub use driven::DrivenTraverse;
+pub use followed::Followed;
 pub use index_file::{Existing, IndexFormat};
 pub use native::{Traverse, write};
 pub use render_cache::RenderCache;

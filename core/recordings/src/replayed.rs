@@ -12,7 +12,7 @@ use sightline_geometry::camera::MastAngles;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::{Pixel, Vector3};
-use sightline_rover::driving::{ActiveWorld, DriveReport, Motion};
+use sightline_rover::driving::{ActiveWorld, DriveReport, FollowedCycle, Motion};
 use sightline_rover::pipeline::Stops;
 use sightline_rover::visual_odometry::MeasuredMotion;
 
@@ -101,6 +101,8 @@ impl ActiveWorld for Replayed<'_> {
     fn stay(&mut self) -> Result<()> {
         self.go_on(None).map(drop)
     }
+
+    fn keep_decision(&mut self, _followed: &FollowedCycle<'_>) {}
 
     fn correct(&mut self, _measured: MeasuredMotion) -> Result<()> {
         Ok(())

@@ -228,11 +228,12 @@ pub(crate) fn check_command(traverse: &Traverse, command: &DriveCommand, first: 
     Err(Error::setting("offset_m", problem))
 }
 
-/// What a run decides at each of its stops under a command, and what the rover reported of the drives between them.
+/// The decisions at the stops of a run: those that the rover followed, and under the command where it has not driven on.
 ///
-/// For the run that drives these are the decisions that were followed; for another run they show where it would have gone.
-/// `maps` keeps the hazard maps for the next call; those that are missing are computed, and a missing image of their pair is rendered.
-pub fn cycles(
+/// Decisions that were followed for another target, or are not known, are made again under the command: they show where the run
+/// would have gone. `maps` keeps the hazard maps for the next call; those that are missing are computed, and a missing image of
+/// their pair is rendered.
+fn cycles(
     world: &DrivenTraverse,
     command: &DriveCommand,
     steps: &[Arc<RunStep>],
@@ -241,8 +242,14 @@ pub fn cycles(
     let mut cycles = Vec::<Cycle>::with_capacity(steps.len());
     let Some(first) = steps.first() else { return cycles };
     let navigator = &*command.navigator.navigator();
+    let designation = first.trace.update.target.designation;
     for step in steps {
-        let before = cycles.last();
+        if let Some(followed) = world.followed(step.step).filter(|known| known.designation == designation) {
+            cycles.push(followed.cycle.clone());
+            continue;
+        }
+        let before = cycles.last().map(|last| towards_goal(world, command, last.clone()));
+        let before = before.as_ref();
         let (first, last) = (&first.trace, &step.trace);
         // Never cancelled.
         let hazards = maps.at(world.traverse(), command, [first, last], Cancel::default()).ok().flatten();
@@ -254,6 +261,24 @@ pub fn cycles(
         cycles.push(cycle);
     }
     cycles
+}
+
+/// The decision before the next one at the last of a run's stops, `steps` being those before it.
+pub fn cycle_before(
+    world: &DrivenTraverse,
+    command: &DriveCommand,
+    steps: &[Arc<RunStep>],
+    maps: &mut HazardMaps,
+) -> Option<Cycle> {
+    cycles(world, command, steps, maps).pop().map(|last| towards_goal(world, command, last))
+}
+
+/// A decision as it counts for the next one: actions after arrival at another goal are left out.
+fn towards_goal(world: &DrivenTraverse, command: &DriveCommand, mut cycle: Cycle) -> Cycle {
+    if world.followed(cycle.step).is_some_and(|followed| !command.has_goal_of(&followed.command)) {
+        cycle.arrival_actions = 0;
+    }
+    cycle
 }
 
 /// The outcome of a drive so far.

@@ -7,7 +7,10 @@ use sightline_geometry::camera::MastAngles;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
 use sightline_geometry::frames::Pixel;
+use sightline_track::target::Designation;
 
+use super::command::DriveCommand;
+use super::executive::Cycle;
 use super::motion::Motion;
 use crate::pipeline::Stops;
 use crate::visual_odometry::MeasuredMotion;
@@ -28,6 +31,10 @@ pub trait ActiveWorld {
     /// # Errors
     /// A world that cannot be continued, or a stop that cannot be stored.
     fn stay(&mut self) -> Result<()>;
+
+    /// Keeps the decision that led to the last stop, with the report of the drive; it is stored with the stop. A recording was
+    /// driven by other decisions.
+    fn keep_decision(&mut self, followed: &FollowedCycle<'_>);
 
     /// Keeps how vision measured the motion to the last stop, and corrects the estimated pose there by it. A recording keeps
     /// its poses.
@@ -63,6 +70,17 @@ pub trait ActiveWorld {
     /// # Errors
     /// A stop that cannot be stored.
     fn expose(&mut self, around: Option<Pixel>) -> Result<()>;
+}
+
+/// A decision that was followed.
+#[derive(Clone, Copy, Debug)]
+pub struct FollowedCycle<'a> {
+    /// The target on whose estimates the rover moved.
+    pub designation: Designation,
+    /// The command.
+    pub command: &'a DriveCommand,
+    /// The decision, with the report of the drive.
+    pub cycle: &'a Cycle,
 }
 
 /// What the rover reports of one step.

@@ -192,6 +192,12 @@ impl DriveCommand {
         Ok(())
     }
 
+    /// Whether another command has the same goal for the same target.
+    pub fn has_goal_of(&self, other: &Self) -> bool {
+        (self.standoff_m, self.offset_m, self.goal, self.tolerance_m)
+            == (other.standoff_m, other.offset_m, other.goal, other.tolerance_m)
+    }
+
     /// Refuses a command that makes no sense for a target at this position in the rover frame of the designation.
     ///
     /// # Errors

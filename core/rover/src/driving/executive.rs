@@ -16,7 +16,7 @@ use sightline_track::stages::update::Updated;
 use sightline_track::target::TrackingState;
 use sightline_track::trace::StepTrace;
 
-use super::active_world::{ActiveWorld, DriveReport};
+use super::active_world::{ActiveWorld, DriveReport, FollowedCycle};
 use super::command::{ArrivalAction, DriveCommand, GoalRule};
 use super::dead_reckoning::Reckoned;
 use super::flight_time::FlightTime;
@@ -194,6 +194,8 @@ pub fn drive(world: &mut dyn ActiveWorld, input: &CycleInput<'_>, cancel: Cancel
         }
         None => world.stay()?,
     }
+    let designation = input.first.update.target.designation;
+    world.keep_decision(&FollowedCycle { designation, command: input.command, cycle: &cycle });
     Ok(cycle)
 }
 

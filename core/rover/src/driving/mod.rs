@@ -18,7 +18,7 @@ pub mod path_choice;
 pub mod select_path;
 pub mod set_goal;
 
-pub use active_world::{ActiveWorld, DriveReport, Stall};
+pub use active_world::{ActiveWorld, DriveReport, FollowedCycle, Stall};
 pub use command::{ArrivalAction, DriveCommand, GoalRule, NavigatorKind, TrackedStops};
 pub use dead_reckoning::Reckoned;
 pub use executive::{Cycle, Ending, StopReason};
