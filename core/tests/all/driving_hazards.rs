@@ -18,13 +18,12 @@ use sightline_world::{Scenario, choose_targets, library};
 
 fn scenario() -> Scenario {
     let mut scenario = Scenario { seed: 3006, ..library::scenario("obstacles-10").unwrap() };
-    (scenario.camera.image_size, scenario.camera.samples_per_axis) = (256, 1);
+    (scenario.camera.image_size, scenario.camera.samples_per_axis) = (256, 2);
     scenario.targets.window_px = 9;
     (scenario.drive.start_distance_m, scenario.drive.end_distance_m) = (8.0, 2.0);
     // One rock on level ground; no other is in the way.
     (scenario.rocks.area_fraction, scenario.rocks.smallest_m) = (0.01, 0.1);
     scenario.terrain.slope_deg = 0.0;
-    scenario.rocks.placed[0].x_m = -4.5;
     scenario
 }
 

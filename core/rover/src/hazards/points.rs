@@ -8,9 +8,9 @@
 use sightline_geometry::camera::Camera;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
-use sightline_geometry::frames::{Pixel, Point3};
+use sightline_geometry::frames::{Pixel, Point3, Vector3};
 use sightline_vision::image::GrayImage;
-use sightline_vision::stereo::dense_stereo_until;
+use sightline_vision::stereo::{Plane, dense_stereo_about};
 
 use super::map::RangeNoise;
 use super::settings::HazardSettings;
@@ -35,7 +35,7 @@ fn reduction(left: &Camera, settings: &HazardSettings) -> u32 {
 /// The points that a stereo pair shows, rover frame, m, row by row of the left image, without those of the rover itself.
 ///
 /// # Errors
-/// As [`dense_stereo_until`].
+/// As [`dense_stereo_about`].
 pub fn range_points(
     images: [&GrayImage; 2],
     cameras: [&Camera; 2],
@@ -49,12 +49,20 @@ pub fn range_points(
     }
     let factor = reduction(cameras[0], settings);
     let stereo = settings.stereo();
+    // The ground on which the rover would stand if it were level.
+    let ground = Plane { normal: Vector3::z(), distance_m: settings.ground_below_m };
     let dense = if factor == 1 {
-        dense_stereo_until(images, cameras, &stereo, cancel)?
+        dense_stereo_about(images, cameras, &ground, &stereo, cancel)?
     } else {
         let [left, right] =
             [0, 1].map(|k| Reduced::new(Eye { camera: cameras[k], image: images[k] }, factor));
-        dense_stereo_until([&left.image, &right.image], [&left.camera, &right.camera], &stereo, cancel)?
+        dense_stereo_about(
+            [&left.image, &right.image],
+            [&left.camera, &right.camera],
+            &ground,
+            &stereo,
+            cancel,
+        )?
     };
     let found = dense.points_m.iter().filter(|point| point[0].is_finite());
     let is_own = |point: &Point3| {

@@ -61,6 +61,8 @@ settings_group! {
         own_half_width_m: f64 = 1.2, "m", Domain::Between(0.0, 3.0), "ours: the body of MER";
         /// Points higher above the rover's origin are left out: it passes below them, or they are false matches.
         height_max_m: f64 = 2.0, "m", Domain::Between(0.2, 20.0), "ours";
+        /// The ground is this far below the rover's origin: range data are matched about that plane.
+        ground_below_m: f64 = 0.294, "m", Domain::Between(0.0, 2.0), "VICAR PigMER";
         /// Images wider than this are reduced before stereo.
         range_width_px: u32 = 256, "px", Domain::Between(64.0, 2048.0), "Kim09 §3; flown width";
         /// Cells nearer to the target count as good (target exemption); 0: none.

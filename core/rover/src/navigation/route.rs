@@ -48,7 +48,8 @@ impl<'a> Route<'a> {
         let side = grid.side;
         let seeds: Vec<(usize, f32)> = if grid.index_at(goal_m).is_some() {
             let is_near = |index: &usize| distance(*index) <= 2.0 * grid.cell_m as f32;
-            (0..grid.len()).filter(is_near).map(|index| (index, distance(index) * costs[index])).collect()
+            // At the cost of good ground: T is then least at the goal, also where that lies beside bad ground.
+            (0..grid.len()).filter(is_near).map(|index| (index, distance(index))).collect()
         } else {
             let is_border = |index: &usize| {
                 [index / side, index % side].into_iter().any(|number| number == 0 || number + 1 == side)

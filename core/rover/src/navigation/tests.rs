@@ -117,6 +117,21 @@ fn a_blocked_corridor_has_no_safe_path() {
 }
 
 #[test]
+fn a_route_ends_at_a_goal_beside_bad_ground() {
+    let stance = pose([0.0, 0.0], 0.0);
+    let rocks = [Rock { at: [3.0, 0.1], radius: 0.35, height: 0.4 }];
+    let map = known(&stance, &HazardSettings::default(), |x, y| rocks_height(&rocks, x, y));
+    // From well beside the rock to a cell whose disc touches it.
+    for goal in [[4.3, 0.0], [4.0, 0.0], [3.0, 1.4], [3.0, 0.1]] {
+        let route = select(NavigatorPreset::Gestalt, &map, &stance, goal, 0.6).route_m;
+        assert_eq!(route.last(), Some(&goal));
+        let steps = route.windows(2).map(|pair| (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]));
+        let length_m: f64 = steps.sum();
+        assert!(length_m < goal[0].hypot(goal[1]) + 2.0, "{goal:?}: {length_m} m, {} points", route.len());
+    }
+}
+
+#[test]
 fn unknown_ground_is_vetoed_with_its_share() {
     let stance = pose([0.0, 0.0], 0.0);
     let settings = HazardSettings::default();

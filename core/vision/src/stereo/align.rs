@@ -14,6 +14,15 @@
 //! | field_max | [`AlignSettings::field_max_deg`] | deg |
 //! | B | [`Alignment::baseline_m`] | m |
 //!
+//! **About a plane** m·P = h (the ground). Its disparity is linear in the pixel; the right camera is sheared so that it is the same,
+//! d₀, in every pixel. A window then covers ground of one disparity, while on unsheared images it changes by a pixel and more
+//! from the upper to the lower rows of a window, and the answer depends on where the texture is.
+//!
+//! ```text
+//! d(x, y) = a x + b y + c      of the plane:  hs B/(h − m·C1) · m·u,   u: the ray of (x, y) with n̂·u = 1
+//! H_R = (H + b V + c A)/(1 − a) − d₀ A      d₀: half the largest d: ground twice as far below the camera has a disparity, too
+//! ```
+//!
 //! **Resampling.** A pixel of an aligned image shows what the real camera sees along its ray. Where that is in the real image
 //! is computed exactly at every eighth pixel and by cubics in between (Lagrange), which errs by less than 1e-4 px for
 //! lenses such as the hazcams'. Rays of a CAHVORE model do not start at C: its pixels are those of points at
@@ -32,7 +41,7 @@ use crate::image::resample::at_places;
 use crate::image::sample::Kernel;
 use sightline_geometry::camera::{Cahv, Camera, CameraModel};
 use sightline_geometry::error::{Error, Result};
-use sightline_geometry::frames::{Pixel, Vector3};
+use sightline_geometry::frames::{Pixel, Point3, Vector3};
 
 /// Pixels between two exact places of a warp.
 const STEP: usize = 8;
@@ -59,13 +68,24 @@ impl Default for AlignSettings {
     }
 }
 
+/// A plane: the points P with `normal`·P = `distance_m`, in the frame of the cameras.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plane {
+    /// Unit vector across it.
+    pub normal: Vector3,
+    /// Its distance from the origin along the normal, m.
+    pub distance_m: f64,
+}
+
 /// Two aligned cameras, and where their pixels lie in the images of the real ones.
 #[derive(Clone, Debug)]
 pub struct Alignment {
     /// The aligned left camera, in the frame of the real ones.
     pub left: Camera,
-    /// The aligned right camera: as the left one, but for its centre.
+    /// The aligned right camera: as the left one, but for its centre, and sheared about a plane.
     pub right: Camera,
+    /// The disparity of that plane, px; 0 without one.
+    pub plane_px: f64,
     warps: [Warp; 2],
 }
 
@@ -75,6 +95,19 @@ impl Alignment {
     /// # Errors
     /// [`Error::Request`] when they stand in one place, look along the line between them, or see nothing in common.
     pub fn new(left: &Camera, right: &Camera, settings: &AlignSettings) -> Result<Self> {
+        Self::about(left, right, None, settings)
+    }
+
+    /// Aligns two cameras so that all points of a plane have one disparity.
+    ///
+    /// # Errors
+    /// As [`Self::new`], and for a plane that does not lie in front of the left camera.
+    pub fn about(
+        left: &Camera,
+        right: &Camera,
+        plane: Option<&Plane>,
+        settings: &AlignSettings,
+    ) -> Result<Self> {
         let size = settings.size.unwrap_or(left.size);
         if !(5.0..=80.0).contains(&settings.field_max_deg) || !(0.1..=1000.0).contains(&settings.range_m) {
             return Err(Error::setting(
@@ -100,16 +133,22 @@ impl Alignment {
             .map(|(side, extent)| (f64::from(side) - 1.0) / extent);
         let horizontal = axes.x * hs + axes.n * (hs * t_left);
         let vertical = axes.y * vs + axes.n * (vs * t_top);
-        let aligned = |real: &Camera| {
+        let aligned = |real: &Camera, horizontal: Vector3| {
             let model = Cahv::as_printed(real.model.centre(), axes.n, horizontal, vertical);
             Camera { model: CameraModel::Cahv(model), size }
         };
-        let (aligned_left, aligned_right) = (aligned(left), aligned(right));
+        let aligned_left = aligned(left, horizontal);
+        let (sheared, plane_px) = match plane {
+            Some(plane) => shear(&aligned_left, right.model.centre(), plane)
+                .ok_or_else(|| cannot("the plane does not lie in front of its left camera"))?,
+            None => (horizontal, 0.0),
+        };
+        let aligned_right = aligned(right, sheared);
         let warps = [
             Warp::new(&aligned_left, left, settings.range_m),
             Warp::new(&aligned_right, right, settings.range_m),
         ];
-        Ok(Self { left: aligned_left, right: aligned_right, warps })
+        Ok(Self { left: aligned_left, right: aligned_right, plane_px, warps })
     }
 
     /// B, m.
@@ -117,7 +156,7 @@ impl Alignment {
         (self.right.model.centre() - self.left.model.centre()).norm()
     }
 
-    /// The disparity of a depth along A (m), px.
+    /// The disparity of a depth along A (m), px, without a plane.
     pub fn disparity_px(&self, depth_m: f64) -> f64 {
         self.left.model.image_plane().hs * self.baseline_m() / depth_m
     }
@@ -137,6 +176,33 @@ impl Alignment {
     pub fn right_row(&self, y: f64) -> WarpRow {
         self.warps[1].row(y)
     }
+}
+
+/// H of the right camera in whose image all points of a plane have one disparity, and that disparity, px; `None` for a plane that
+/// no pixel sees, or one seen from its edge.
+fn shear(left: &Camera, right_centre: Point3, plane: &Plane) -> Option<(Vector3, f64)> {
+    let (linear, image) = (left.model.linear(), left.model.image_plane());
+    let centre = left.model.centre();
+    let baseline_m = (right_centre - centre).norm();
+    let height_m = plane.distance_m - plane.normal.dot(&centre.coords);
+    let (x, y) = (
+        (linear.horizontal - linear.axis * image.hc) / image.hs,
+        (linear.vertical - linear.axis * image.vc) / image.vs,
+    );
+    let slope = image.hs * baseline_m / height_m;
+    let a = slope * plane.normal.dot(&x) / image.hs;
+    let b = slope * plane.normal.dot(&y) / image.vs;
+    let c = slope * plane.normal.dot(&linear.axis) - a * image.hc - b * image.vc;
+    let [last_x, last_y] = left.size.map(|side| f64::from(side) - 1.0);
+    let corners = [[0.0, 0.0], [last_x, 0.0], [0.0, last_y], [last_x, last_y]];
+    let largest_px = corners.into_iter().map(|[x, y]| a * x + b * y + c).fold(f64::MIN, f64::max);
+    if !(largest_px.is_finite() && largest_px > 0.0 && a < 0.5) {
+        return None;
+    }
+    let plane_px = (0.5 * largest_px).ceil();
+    let horizontal =
+        (linear.horizontal + linear.vertical * b + linear.axis * c) / (1.0 - a) - linear.axis * plane_px;
+    Some((horizontal, plane_px))
 }
 
 /// The axes of the aligned pair.

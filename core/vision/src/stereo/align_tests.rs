@@ -195,3 +195,39 @@ fn pairs_that_have_no_rows_in_common_are_refused() {
     let narrow = AlignSettings { field_max_deg: 2.0, ..AlignSettings::default() };
     assert!(Alignment::new(&left, &right, &narrow).is_err());
 }
+
+#[test]
+fn about_a_plane_all_of_its_points_have_one_disparity() {
+    let (left, right) = navcams();
+    let normal = Vector3::new(0.1, -0.05, 1.0).normalize();
+    let plane = Plane { normal, distance_m: 0.4 };
+    let alignment = Alignment::about(&left, &right, Some(&plane), &AlignSettings::default()).unwrap();
+    let mut seen = 0;
+    for k in 0..400 {
+        let k = f64::from(k);
+        let pixel = Pixel::new((k * 61.803).rem_euclid(1023.0), 560.0 + (k * 38.197).rem_euclid(463.0));
+        let Some(ray) = alignment.left.ray(pixel) else { continue };
+        let along_m = (plane.distance_m - normal.dot(&ray.origin.coords)) / normal.dot(&ray.direction);
+        if along_m < 0.1 {
+            continue;
+        }
+        let on_plane = ray.at(along_m);
+        let in_right = alignment.right.project(&on_plane).unwrap();
+        assert!((in_right.y - pixel.y).abs() < 1e-9);
+        assert!((pixel.x - in_right.x - alignment.plane_px).abs() < 1e-6, "{pixel:?} {in_right:?}");
+        // What stands on the plane is in the same row, with a larger disparity.
+        let above = alignment.left.ray(pixel).unwrap().at(0.7 * along_m);
+        let in_right = alignment.right.project(&above).unwrap();
+        assert!((in_right.y - pixel.y).abs() < 1e-9 && pixel.x - in_right.x > alignment.plane_px + 0.5);
+        // The aligned right image shows there what the real camera sees.
+        if (0.0..=1023.0).contains(&in_right.x) {
+            let (taken, seen) = (alignment.right_row(in_right.y).at(in_right.x), right.project(&above).unwrap());
+            assert!(taken.distance(seen) < 1e-3, "{taken:?} {seen:?}");
+        }
+        seen += 1;
+    }
+    assert!(seen > 200, "{seen}");
+    let above = Plane { normal, distance_m: -30.0 };
+    let refused = Alignment::about(&left, &right, Some(&above), &AlignSettings::default());
+    assert!(refused.err().unwrap().to_string().contains("plane"));
+}

@@ -55,7 +55,7 @@ use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Point3;
 
-pub use align::{AlignSettings, Alignment};
+pub use align::{AlignSettings, Alignment, Plane};
 pub use settings::{StereoMethod, StereoPaths, StereoSettings};
 
 use row::RowResult;
@@ -145,13 +145,38 @@ pub fn dense_stereo(
     dense_stereo_until([left, right], cameras, settings, Cancel::default())
 }
 
+/// [`dense_stereo_until`] of a scene near a plane, in the frame of the cameras, such as the ground: the pair is aligned about it, and
+/// disparities are relative to its own ([`Alignment::about`]).
+///
+/// # Errors
+/// As [`dense_stereo_until`], and for a plane that does not lie in front of the left camera.
+pub fn dense_stereo_about(
+    images: [&GrayImage; 2],
+    cameras: [&Camera; 2],
+    plane: &Plane,
+    settings: &StereoSettings,
+    cancel: Cancel<'_>,
+) -> Result<DenseStereo> {
+    dense(images, cameras, Some(plane), settings, cancel)
+}
+
 /// [`dense_stereo`], which ends within a row or an alignment once `cancel` is requested.
 ///
 /// # Errors
 /// As [`dense_stereo`], and [`Error::Cancelled`].
 pub fn dense_stereo_until(
+    images: [&GrayImage; 2],
+    cameras: [&Camera; 2],
+    settings: &StereoSettings,
+    cancel: Cancel<'_>,
+) -> Result<DenseStereo> {
+    dense(images, cameras, None, settings, cancel)
+}
+
+fn dense(
     [left, right]: [&GrayImage; 2],
     cameras: [&Camera; 2],
+    plane: Option<&Plane>,
     settings: &StereoSettings,
     cancel: Cancel<'_>,
 ) -> Result<DenseStereo> {
@@ -160,10 +185,12 @@ pub fn dense_stereo_until(
             return Err(Error::Request("an image of the pair is not as large as its camera says".to_owned()));
         }
     }
-    let alignment = Alignment::new(cameras[0], cameras[1], &settings.align)?;
+    let alignment = Alignment::about(cameras[0], cameras[1], plane, &settings.align)?;
     let mut settings = settings.clone();
     if settings.disparity_count == 0 {
-        let nearest = alignment.disparity_px(settings.range_min_m) - f64::from(settings.disparity_first_px);
+        // What stands on a plane is nearer than the plane: its disparity is larger by less than its own.
+        let nearest = alignment.disparity_px(settings.range_min_m) + alignment.plane_px
+            - f64::from(settings.disparity_first_px);
         settings.disparity_count = (nearest.ceil() as u32 + 1).clamp(8, 512);
     }
     let images = alignment.images(left, right);
