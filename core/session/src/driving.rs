@@ -111,7 +111,7 @@ pub struct DriveSummary {
     pub driven_m: f64,
     /// Steps that a rock ended, and stops at which a rock reaches into the rover's body.
     pub collisions: u32,
-    /// Whether the target was tracked at the last stop (R116); null without truth.
+    /// Whether the target was tracked at the last stop; null without truth.
     pub tracked: Option<bool>,
     /// Time on Mars, min.
     pub flight_minutes: f64,

@@ -47,16 +47,16 @@ pub struct Target {
     /// Covariance of that position, m².
     #[schema(value_type = Vec<f64>)]
     pub covariance_in_rover: Matrix3<f64>,
-    /// Position at designation in the site frame, m; never changed (R84).
+    /// Position at designation in the site frame, m; never changed (Kim09 §4.6).
     #[schema(value_type = [f64; 3])]
     pub initial_position_in_site: Point3,
     /// Distance from the left camera at designation, m.
     pub initial_distance_m: f64,
     /// Distance driven since the designation, m.
     pub travelled_m: f64,
-    /// Distance from the left camera at the last accepted update, m: `D_old` of R87.
+    /// Distance from the left camera at the last accepted update, m (`D_old`).
     pub last_distance_m: f64,
-    /// Distance driven since the last accepted update, m: `L_step` of R87.
+    /// Distance driven since the last accepted update, m (`L_step`).
     pub travelled_since_update_m: f64,
     /// What its tracker remembers of the stops so far.
     #[schema(value_type = Object)]

@@ -22,7 +22,7 @@ pub struct Verdict {
     pub state: TrackingState,
 }
 
-/// Where tracking stands (R89): the words of the house, of which `tracking` is the papers' "normal".
+/// Where tracking stands (Kim09 §4.6): the words of the house, of which `tracking` is the papers' "normal".
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "state", rename_all = "snake_case")]
 pub enum TrackingState {

@@ -83,7 +83,7 @@ pub struct StepTruth {
     pub nees: Option<f64>,
     /// Magnification since the designation.
     pub magnification: f64,
-    /// The error up to which the target counts as tracked, px (R116).
+    /// The error up to which the target counts as tracked, px.
     pub tolerance_px: f64,
     /// Whether the target is tracked: state `tracking` and within the tolerance; null where the truth is hidden, and at a
     /// stop at which visual odometry runs alone.

@@ -39,6 +39,7 @@ pub(super) fn reason(reason: StopReason) -> &'static str {
         StopReason::Tilt => "tilted too much",
         StopReason::Time => "time on Mars used up",
         StopReason::StopLimit => "all stops used up",
+        StopReason::LimitCycle => "limit cycle",
         StopReason::NoSafePath => "no safe path",
         StopReason::NoRangeData => "no range data",
     }
@@ -135,6 +136,7 @@ pub(super) fn ending(ending: &Ending) -> String {
         | StopReason::Lost
         | StopReason::Stalled
         | StopReason::Slip
+        | StopReason::LimitCycle
         | StopReason::NoSafePath => "",
     };
     if let Some(detail) = &ending.detail {

@@ -74,7 +74,7 @@ impl NavigatorKind {
     }
 }
 
-/// An action after arrival (R5).
+/// An action after arrival (Kim09 §3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ArrivalAction {
@@ -95,9 +95,9 @@ pub struct DriveCommand {
     pub offset_m: [f64; 2],
     /// Whether tracking moves the goal (`follows_target`).
     pub goal: GoalRule,
-    /// The rover has arrived when its frame's origin is nearer to the goal than this, horizontally, m (0.05: R7; 0.001 to 1).
+    /// The rover has arrived when its frame's origin is nearer to the goal than this, horizontally, m (0.05: ours; 0.001 to 1).
     pub tolerance_m: f64,
-    /// Longest step as a part of the distance to the target (0.10: R104; 0.01 to 0.5).
+    /// Longest step as a part of the distance to the target (0.10: Kim09 §5.4; 0.01 to 0.5).
     pub step_fraction: f64,
     /// The stops at which the target is looked for (`every`). Without odometry it has no effect.
     pub tracked_stops: TrackedStops,
@@ -114,7 +114,7 @@ pub struct DriveCommand {
     /// The pair of every stop whose images give the hazard map, by its name (null: the first pair on the body that looks ahead).
     /// With `arcs` it has no effect.
     pub hazard_camera: Option<CameraName>,
-    /// Ground nearer to the target counts as good on the hazard map, m (0: none; 0 to 5; R100).
+    /// Ground nearer to the target counts as good on the hazard map, m (0: none; 0 to 5; Kim09 §6).
     pub exemption_radius_m: f64,
     /// The drive stops when the slip of a step is measured as larger, as a part of the wheels' motion (0.9; 0.05 to 2). Without
     /// odometry it has no effect.

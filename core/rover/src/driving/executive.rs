@@ -20,6 +20,7 @@ use super::active_world::{ActiveWorld, DriveReport, FollowedCycle};
 use super::command::{ArrivalAction, DriveCommand, GoalRule};
 use super::dead_reckoning::Reckoned;
 use super::flight_time::FlightTime;
+use super::limit_cycle;
 use super::map_hazards::StopHazards;
 use super::motion::Motion;
 use super::next_motion::{self, slip_to};
@@ -48,6 +49,8 @@ pub enum StopReason {
     Time,
     /// The number of stops is used up.
     StopLimit,
+    /// The rover has come back to one place again and again.
+    LimitCycle,
     /// Every path is vetoed by the hazard map.
     NoSafePath,
     /// The pair of the hazard map is missing, or gives too few points.
@@ -59,13 +62,13 @@ pub enum StopReason {
 pub struct Ending {
     /// Why it stopped.
     pub reason: StopReason,
-    /// The value that decided, in the unit of its limit: m, a part, deg, min, a count; null for `lost`, `stalled` and
-    /// `no_safe_path`, and for a missing pair.
+    /// The value that decided, in the unit of its limit: m, a part, deg, min, a count; null for `lost`, `stalled`, `limit_cycle`
+    /// and `no_safe_path`, and for a missing pair.
     pub value: Option<f64>,
     /// The limit that it met; null where `value` is.
     pub limit: Option<f64>,
-    /// The reason in more detail: the smallest change of a limit that opens a path, or why there are no range data; null for the
-    /// other reasons.
+    /// The reason in more detail: the smallest change of a limit that opens a path, why there are no range data, or which stops are
+    /// at one place; null for the other reasons.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub detail: Option<String>,
 }
@@ -322,9 +325,13 @@ fn ending(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &Cycle) -> Option<En
     if cycle.flight_minutes > command.flight_minutes_max {
         return end(StopReason::Time, cycle.flight_minutes, command.flight_minutes_max);
     }
-    let stops = cycle.step + 1 - input.first.step;
-    if stops >= command.stops_max as usize {
-        return end(StopReason::StopLimit, stops as f64, f64::from(command.stops_max));
+    let count = cycle.step + 1 - input.first.step;
+    if count >= command.stops_max as usize {
+        return end(StopReason::StopLimit, count as f64, f64::from(command.stops_max));
     }
-    None
+    let poses: Vec<Pose> = (input.first.step..=cycle.step).map(|step| stops.site_from_rover(step)).collect();
+    let visits: Vec<usize> =
+        limit_cycle::visits(&poses).into_iter().map(|index| input.first.step + index).collect();
+    (visits.len() >= limit_cycle::VISITS_MAX)
+        .then(|| Ending::named(StopReason::LimitCycle, Some(limit_cycle::sentence(&visits))))
 }

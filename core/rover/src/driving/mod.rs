@@ -10,6 +10,7 @@ pub mod command;
 pub mod dead_reckoning;
 pub mod executive;
 pub mod flight_time;
+mod limit_cycle;
 pub mod map_hazards;
 pub mod motion;
 mod next_motion;

@@ -88,10 +88,10 @@ fn a_veto_names_the_first_failing_cell() {
     assert_eq!(veto.term, HazardTerm::Step);
     // The rock covers a part of its outermost cells, whose mean height is less than its own.
     assert!(veto.value > veto.limit && veto.value < 0.401 && (veto.limit - 0.182).abs() < 1e-9, "{veto:?}");
-    // The rock begins at 1.7 m, the leading disc is 0.3 m ahead and has a radius of 0.8 m: 0.6 m, by whole cells.
-    assert!((veto.along_m - 0.6).abs() < 0.101, "{veto:?}");
+    // The rock begins at 1.7 m, the leading disc is 0.45 m ahead and has a radius of 0.8 m: 0.45 m, by whole cells.
+    assert!((veto.along_m - 0.45).abs() < 0.101, "{veto:?}");
     assert!(
-        (veto.in_site_m[0] - veto.along_m - 0.35).abs() < 0.051 && (veto.in_site_m[1] - 0.05).abs() < 1e-9
+        (veto.in_site_m[0] - veto.along_m - 0.5).abs() < 0.051 && (veto.in_site_m[1] - 0.05).abs() < 1e-9
     );
     // Every cell before it passes.
     let cell = map.cell_at([veto.in_site_m[0] - 0.1, veto.in_site_m[1]]).unwrap();

@@ -57,7 +57,7 @@ pub struct StepRow {
     pub position_tolerance_m: Option<f64>,
     /// What the paper's budget grants a drive without tracking at this range, m, 3σ (K-Eq 3).
     pub budget_without_m: Option<f64>,
-    /// What the paper's budget grants tracking that drifts by half a pixel of the first image, m, 3σ (K-Eq 5, R40).
+    /// What the paper's budget grants tracking that drifts by half a pixel of the first image, m, 3σ (Kim09 Eq. 5).
     pub budget_with_m: Option<f64>,
     /// Why an update was rejected, what is wrong with the stop's files, or where the drive is paused.
     pub reason: Option<String>,

@@ -27,9 +27,9 @@ pub struct Updated {
     pub state: TrackingState,
     /// Whether the template was taken anew.
     pub template_renewed: bool,
-    /// How far the located position lies from the predicted one, m (R30).
+    /// How far the located position lies from the predicted one, m (Kim09 §4.1).
     pub correction_m: Option<f64>,
-    /// How far the match lies from the predicted pixel, px (R32).
+    /// How far the match lies from the predicted pixel, px (Kim09 §7.2).
     pub correction_px: Option<f64>,
 }
 

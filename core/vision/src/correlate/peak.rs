@@ -61,7 +61,7 @@ pub struct Peak {
     pub at_edge: bool,
 }
 
-/// The highest local maximum away from the best (R68): how near the match was to another.
+/// The highest local maximum away from the best: how near the match was to another.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct SecondPeak {
     /// Where the template's centre lies, whole px.

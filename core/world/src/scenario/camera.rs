@@ -122,7 +122,7 @@ pub struct CameraSettings {
     /// Which pair of cameras.
     pub rig: CameraRig,
     /// A pair on the body to which the target is handed over: after the last stop the rover stays where it is and
-    /// this pair takes one more stop (none; `mer_front_hazcam`: R205, R209).
+    /// this pair takes one more stop (none; `mer_front_hazcam`: Deans05 §3).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hand_over: Option<CameraRig>,
     /// Width of the image, px: 1024, 512, 256 or 128; smaller ones are block averages (domain.md 2.1). The

@@ -50,13 +50,13 @@ pub enum Move {
     },
     /// On the spot.
     Turn {
-        /// How far, deg, positive to the right (−360 to 360; R107).
+        /// How far, deg, positive to the right (−360 to 360; Kim09 §5.4).
         angle_deg: f64,
         /// Into how many equal steps it is divided (1).
         #[serde(default = "one")]
         stops: u32,
     },
-    /// Around the targets' centre on the circle of the present radius, always facing it (R118).
+    /// Around the targets' centre on the circle of the present radius, always facing it (Kim09 §5.2).
     Crab {
         /// How far around the centre, deg, positive clockwise seen from above (−360 to 360).
         angle_deg: f64,
@@ -87,11 +87,11 @@ fn one() -> u32 {
 pub struct DriveSettings {
     /// What the drive is made of (`approach`).
     pub course: Course,
-    /// Distance from the centre of the left camera to the targets' centre at the first stop, m (10: R108).
+    /// Distance from the centre of the left camera to the targets' centre at the first stop, m (10: Kim09 §5.1).
     pub start_distance_m: f64,
-    /// Course `approach`: the last stop is the first one at this distance or nearer, m (2: R106).
+    /// Course `approach`: the last stop is the first one at this distance or nearer, m (2: Kim09 §5.4).
     pub end_distance_m: f64,
-    /// Course `approach`: part of the remaining distance that a step takes away (0.10: R104).
+    /// Course `approach`: part of the remaining distance that a step takes away (0.10: Kim09 §5.4).
     pub step_fraction: f64,
     /// Where the targets' centre lies as seen from the rover frame's origin at the first stop, deg, 0 ahead,
     /// positive to the right (0; the course `approach` has no other).

@@ -16,10 +16,10 @@ pub struct EventSettings {
     pub sun_elevation_deg_per_h: f64,
     /// Whether the rover's body casts its shadow, and is seen where a camera looks down on it.
     pub rover_body: bool,
-    /// Clouds that pass the sun (R126).
+    /// Clouds that pass the sun (Kim09 §5.5).
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub clouds: Vec<Cloud>,
-    /// Things that stand between the cameras and the targets' centre (R88, R126, R208).
+    /// Things that stand between the cameras and the targets' centre (Kim09 §4.6, Kim09 §5.5, Deans05 §3).
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub occluders: Vec<Occluder>,
 }

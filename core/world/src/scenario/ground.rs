@@ -21,7 +21,7 @@ pub struct TerrainSettings {
     pub hurst: f64,
     /// The longest wavelength of the relief, m; beyond it the ground is level on average (ours).
     pub longest_wavelength_m: f64,
-    /// Slope of the mean plane, deg (6 to 10 is a shallow incline, 15 to 20 a steep one: papers.md R124).
+    /// Slope of the mean plane, deg (6 to 10 is a shallow incline, 15 to 20 a steep one: Kim09 §5.5).
     pub slope_deg: f64,
     /// Direction of steepest ascent, deg clockwise from above: 0 ahead, 90 to the right, 180 behind.
     pub slope_azimuth_deg: f64,
@@ -102,7 +102,7 @@ pub struct ClearPath {
     pub to_y_m: f64,
     /// Half of the strip's width, m (1.2: half of the wheels' track, and room for arcs and for a moving goal; ours).
     pub half_width_m: f64,
-    /// Height of the highest rock that remains in the strip, m (0.10: R99).
+    /// Height of the highest rock that remains in the strip, m (0.10: Kim09 §6).
     pub above_m: f64,
 }
 

@@ -64,7 +64,7 @@ pub struct RoverSettings {
     pub slip_spread: f64,
     /// Height of the highest rock that a wheel climbs, m; a higher one stalls it (0.25: domain.md 5.4).
     pub climb_m: f64,
-    /// From the way to this stop on nothing but the wheels turns: 100 % of slip; 0 means never (0; R126).
+    /// From the way to this stop on nothing but the wheels turns: 100 % of slip; 0 means never (0; Kim09 §5.5).
     pub stuck_from_stop: u32,
     /// Where the pose estimate comes from (`stated`).
     pub odometry: OdometryModel,
@@ -72,13 +72,13 @@ pub struct RoverSettings {
     pub gyro_walk_deg_per_root_hour: f64,
     /// 1σ bias of the gyro, deg/h, one draw for the drive, for `wheels_and_imu` (1: domain.md 5.5).
     pub gyro_bias_deg_per_hour: f64,
-    /// Whether the wheels leave tracks (false: the demonstration shows untouched ground; R142).
+    /// Whether the wheels leave tracks (false: the demonstration shows untouched ground; Kim09 §7.3).
     pub tracks: bool,
     /// Width of a wheel's track, m (0.16, as wide as a wheel; ours).
     pub track_width_m: f64,
     /// How deep a wheel sinks in, m (0.01, ours).
     pub track_depth_m: f64,
-    /// Slips staged for single stops, in any order (none; R126).
+    /// Slips staged for single stops, in any order (none; Kim09 §5.5).
     pub forced_slip: Vec<ForcedSlip>,
     /// Jumps of the estimated heading staged for single stops, in any order (none); no covariance knows of them.
     #[serde(skip_serializing_if = "Vec::is_empty")]

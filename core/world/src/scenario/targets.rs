@@ -29,20 +29,20 @@ pub struct TargetRule {
     pub count: u32,
     /// Which of the pixels that satisfy the rule become targets (drawn).
     pub arrangement: Arrangement,
-    /// Rows of the arrangement `rows` (2: R110).
+    /// Rows of the arrangement `rows` (2: Kim09 §5.1).
     pub rows: u32,
-    /// Targets of the arrangement `face` that lie on an occluding boundary (1: R119).
+    /// Targets of the arrangement `face` that lie on an occluding boundary (1: Kim09 §5.2).
     pub boundary: u32,
     /// Greatest distance of a target's surface point from the targets' centre, m.
     pub radius_m: f64,
-    /// Side of the square window on which the rule is tested, px of this image (21: R21; reduce it together
+    /// Side of the square window on which the rule is tested, px of this image (21: ours; reduce it together
     /// with the image, 11 at 512 and 7 at 256, or few windows are even enough).
     pub window_px: u32,
-    /// Greatest part of the window in shadow (0.20: R21).
+    /// Greatest part of the window in shadow (0.20: ours).
     pub shadow_fraction: f64,
-    /// Greatest range of depth inside the window, as a part of the distance (0.10: R21).
+    /// Greatest range of depth inside the window, as a part of the distance (0.10: ours).
     pub depth_range_fraction: f64,
-    /// Whether targets must lie on rocks, off their occluding boundaries (true: R20).
+    /// Whether targets must lie on rocks, off their occluding boundaries (true: Kim09 §5.2).
     pub on_rocks: bool,
     /// Least part of the window that lies on the same rock as the target (0.90, ours).
     pub same_rock_fraction: f64,

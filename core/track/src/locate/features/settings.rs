@@ -12,7 +12,7 @@ use sightline_geometry::estimate::weighted_motion::Loss;
 use sightline_vision::sift::SiftSettings;
 use sightline_vision::sift::matching::MatchSettings;
 
-/// What decides whether a match agrees with a motion (R165, R167).
+/// What decides whether a match agrees with a motion (Deans05 Eq. 2).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MotionGate {

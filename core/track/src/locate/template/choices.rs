@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// What the roll of the template is measured against (R57).
+/// What the roll of the template is measured against (Kim09 §4.3.1).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RollReference {
@@ -14,7 +14,7 @@ pub enum RollReference {
     OldImage,
 }
 
-/// From where the vertical tolerance of point stereo is measured (R73, E38).
+/// From where the vertical tolerance of point stereo is measured (Kim09 §4.4).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum StereoReference {
@@ -25,7 +25,7 @@ pub enum StereoReference {
     ImageRow,
 }
 
-/// Where the interval of disparities lies (R75, E13).
+/// Where the interval of disparities lies (Kim09 §4.4, corrected).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum DisparityInterval {
@@ -36,7 +36,7 @@ pub enum DisparityInterval {
     FromZero,
 }
 
-/// When an accepted update renews the template (R70, R71).
+/// When an accepted update renews the template (Kim09 §4.3.3).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TemplateUpdate {
@@ -63,7 +63,7 @@ pub enum NoiseModel {
     HalfPixel,
 }
 
-/// What finds the template first (R217, R218).
+/// What finds the template first (Kim09 §2).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FirstStage {
@@ -76,7 +76,7 @@ pub enum FirstStage {
     KltAffine,
 }
 
-/// By what the template and the image are compared (R216, R219).
+/// By what the template and the image are compared (Kim09 §2).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Measure {
@@ -113,7 +113,7 @@ impl Measure {
     }
 }
 
-/// Which positions are compared (R64, R65).
+/// Which positions are compared (Kim09 §4.3.2).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Search {
@@ -124,7 +124,7 @@ pub enum Search {
     CoarseToFine,
 }
 
-/// The second stage (R221, R222).
+/// The second stage (Kim09 §2).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Refine {
@@ -135,7 +135,7 @@ pub enum Refine {
     Affine,
 }
 
-/// Where the template's scale and roll come from (R224).
+/// Where the template's scale and roll come from (Kim09 §2).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Transform {
