@@ -182,7 +182,8 @@ pub(crate) fn drive_on(
 
 /// The last steps of a run, from the first that the rover has not driven on from.
 fn undecided<'a>(driven: &Driven, steps: &'a [Arc<RunStep>]) -> &'a [Arc<RunStep>] {
-    let count = driven.with(|world| steps.iter().take_while(|step| world.followed(step.step).is_some()).count());
+    let count =
+        driven.with(|world| steps.iter().take_while(|step| world.followed(step.step).is_some()).count());
     &steps[count..]
 }
 

@@ -276,8 +276,7 @@ async fn the_document_describes_every_route_and_names_each_once() {
             (1..=3).contains(&rest.len()) && rest.bytes().all(|letter| letter.is_ascii_digit())
         })
     };
-    let numbers: Vec<&str> =
-        text.split(|letter: char| !letter.is_alphanumeric()).filter(is_number).collect();
+    let numbers: Vec<&str> = text.split(|letter: char| !letter.is_alphanumeric()).filter(is_number).collect();
     assert!(numbers.is_empty(), "{numbers:?}");
 }
 

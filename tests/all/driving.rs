@@ -261,9 +261,8 @@ async fn decisions_that_were_followed_stay_when_the_command_changes() {
     let near = json!({ "standoff_m": 4.0, "on_arrival": ["look"] });
     let steering = json!({ "target": 0, "run": 0, "command": near });
     server.json(Method::PUT, &path, &steering).await.expect(200);
-    let is_nearer = |drive: &Value| {
-        has_ended(drive) && drive["cycles"].as_array().unwrap().len() > cycles.len() + 1
-    };
+    let is_nearer =
+        |drive: &Value| has_ended(drive) && drive["cycles"].as_array().unwrap().len() > cycles.len() + 1;
     let ended = waited(&server, &session, is_nearer).await;
     let last = last_cycle(&ended);
     assert_eq!((&last["ending"]["reason"], &last["arrival_actions"]), (&json!("arrived"), &json!(1)));

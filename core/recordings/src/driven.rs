@@ -68,7 +68,12 @@ impl DrivenTraverse {
         write(&index, folder, IndexFormat::Toml, Existing::Refuse)?;
         let traverse = Traverse::open(folder)?;
         traverse.keep_world(world);
-        let driven = Self { traverse, scenario: scenario.clone(), driven: vec![first], decisions: Decisions::default() };
+        let driven = Self {
+            traverse,
+            scenario: scenario.clone(),
+            driven: vec![first],
+            decisions: Decisions::default(),
+        };
         driven.save()?;
         Ok(driven)
     }

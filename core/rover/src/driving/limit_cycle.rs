@@ -44,13 +44,17 @@ mod tests {
 
     #[test]
     fn a_rover_that_turns_to_and_fro_visits_one_place_again() {
-        let poses = [pose(0.0, 0.0), pose(1.0, 0.0), pose(1.0, 18.0), pose(1.01, 1.0), pose(1.0, 19.0), pose(1.0, -1.0)];
+        let poses = [
+            pose(0.0, 0.0),
+            pose(1.0, 0.0),
+            pose(1.0, 18.0),
+            pose(1.01, 1.0),
+            pose(1.0, 19.0),
+            pose(1.0, -1.0),
+        ];
         assert_eq!(visits(&poses), [1, 3, 5]);
         assert_eq!(visits(&poses[..5]), [2, 4]);
-        assert_eq!(
-            sentence(&visits(&poses)),
-            "stops 1, 3 and 5 are at the same place, within 5 cm and 5°"
-        );
+        assert_eq!(sentence(&visits(&poses)), "stops 1, 3 and 5 are at the same place, within 5 cm and 5°");
     }
 
     #[test]

@@ -221,7 +221,8 @@ fn about_a_plane_all_of_its_points_have_one_disparity() {
         assert!((in_right.y - pixel.y).abs() < 1e-9 && pixel.x - in_right.x > alignment.plane_px + 0.5);
         // The aligned right image shows there what the real camera sees.
         if (0.0..=1023.0).contains(&in_right.x) {
-            let (taken, seen) = (alignment.right_row(in_right.y).at(in_right.x), right.project(&above).unwrap());
+            let (taken, seen) =
+                (alignment.right_row(in_right.y).at(in_right.x), right.project(&above).unwrap());
             assert!(taken.distance(seen) < 1e-3, "{taken:?} {seen:?}");
         }
         seen += 1;
