@@ -325,7 +325,7 @@ pub(crate) fn hazards(live: &LiveSession, step: usize, cancel: &CancelFlag) -> A
         return Err(ApiError::not_found(format!("The drive has not come to step {step}.")));
     };
     let mut maps = lock(&driven.maps);
-    // All in turn: a map is that of the last stop before it is judged, and one who steps backwards asks for each.
+    // The maps of all stops, in order: only the last one can be computed from what is kept, and the page also shows earlier ones.
     map_hazards(&open, command, (first, steps), &mut maps, cancel.as_ref().into())?;
     let found = maps.at(&open.traverse, command, [&first.trace, &last.trace], cancel.as_ref().into())?;
     drop(maps);

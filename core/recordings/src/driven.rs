@@ -7,7 +7,7 @@
 //! ```text
 //! scenario.toml   the world            traverse.toml   the stops driven to
 //! driven.json     the world's state    images/         rendered when first asked for
-//! decisions.json  what was followed
+//! decisions.json  the decisions that the rover followed
 //! ```
 
 use std::path::{Path, PathBuf};
@@ -157,7 +157,7 @@ impl DrivenTraverse {
     /// # Errors
     /// A state without a stop, or files that cannot be written.
     pub fn restore(&mut self, state: Vec<DrivenStop>) -> Result<()> {
-        // A decision led to a place; what was done at the stop there is not part of it.
+        // A decision is kept where the drive that it led to is the same; images taken and pointings at the stop may differ.
         let is_driven_alike = |(one, other): &(&DrivenStop, &DrivenStop)| {
             one.time_s == other.time_s && one.true_site_from_rover == other.true_site_from_rover
         };

@@ -215,7 +215,7 @@ fn about_a_plane_all_of_its_points_have_one_disparity() {
         let in_right = alignment.right.project(&on_plane).unwrap();
         assert!((in_right.y - pixel.y).abs() < 1e-9);
         assert!((pixel.x - in_right.x - alignment.plane_px).abs() < 1e-6, "{pixel:?} {in_right:?}");
-        // What stands on the plane is in the same row, with a larger disparity.
+        // A point above the plane has the same row in both images and a larger disparity.
         let above = alignment.left.ray(pixel).unwrap().at(0.7 * along_m);
         let in_right = alignment.right.project(&above).unwrap();
         assert!((in_right.y - pixel.y).abs() < 1e-9 && pixel.x - in_right.x > alignment.plane_px + 0.5);

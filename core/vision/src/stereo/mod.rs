@@ -188,7 +188,7 @@ fn dense(
     let alignment = Alignment::about(cameras[0], cameras[1], plane, &settings.align)?;
     let mut settings = settings.clone();
     if settings.disparity_count == 0 {
-        // What stands on a plane is nearer than the plane: its disparity is larger by less than its own.
+        // Points above the plane: the disparity is plane_px plus less than the disparity of range_min_m.
         let nearest = alignment.disparity_px(settings.range_min_m) + alignment.plane_px
             - f64::from(settings.disparity_first_px);
         settings.disparity_count = (nearest.ceil() as u32 + 1).clamp(8, 512);
