@@ -18,12 +18,16 @@ use sightline_geometry::frames::Point3;
 use sightline_recordings::DrivenTraverse;
 use sightline_rover::driving::set_goal::goal_position_m;
 use sightline_rover::driving::{DriveCommand, GoalRule};
+use sightline_rover::hazards::HazardSettings;
+use sightline_rover::navigation::NavigatorSettings;
 use sightline_session::driving::{DriveSummary, TargetedDrive};
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
 use sightline_world::scenario::{ClearPath, OdometryModel};
 use sightline_world::target_truth::{TargetTruth, TruthSource};
 use sightline_world::{Scenario, World, choose_targets};
+
+use crate::true_ground::true_way_m;
 
 /// One drive.
 #[derive(Clone, Debug, Serialize)]
@@ -34,6 +38,9 @@ pub struct Drive {
     pub summary: Option<DriveSummary>,
     /// Why there is none.
     pub problem: Option<String>,
+    /// Length of a way over the true ground to the goal that follows from the true target, m; null without one, and without
+    /// obstacles.
+    pub way_m: Option<f64>,
 }
 
 /// The drives of a study with one rule for the goal.
@@ -43,6 +50,8 @@ pub struct Outcome {
     pub drives: usize,
     /// Drives that arrived.
     pub arrived: usize,
+    /// Drives for which a way over the true ground exists, and those of them that arrived; 0 without obstacles.
+    pub with_way: [usize; 2],
     /// Drives whose target was tracked at the last stop.
     pub tracked: usize,
     /// Collisions in all drives.
@@ -90,15 +99,15 @@ impl Drives<'_> {
             let _ = std::fs::remove_dir_all(&folder);
             tell();
             match outcome {
-                Ok(summary) => Drive { seed, summary: Some(summary), problem: None },
-                Err(error) => Drive { seed, summary: None, problem: Some(error.to_string()) },
+                Ok((summary, way_m)) => Drive { seed, summary: Some(summary), problem: None, way_m },
+                Err(error) => Drive { seed, summary: None, problem: Some(error.to_string()), way_m: None },
             }
         };
         seeds.par_iter().map(one).collect()
     }
 
-    /// One drive to its end.
-    fn drive(&self, scenario: &Scenario, folder: &Path) -> Result<DriveSummary> {
+    /// One drive to its end, and the length of a way to its goal.
+    fn drive(&self, scenario: &Scenario, folder: &Path) -> Result<(DriveSummary, Option<f64>)> {
         let world = DrivenTraverse::begin(scenario, &folder.join("open"), Cancel::default())?;
         let traverse = world.traverse();
         let targets = traverse.world().map(|world| choose_targets(world, scenario, traverse.index()));
@@ -110,10 +119,20 @@ impl Drives<'_> {
         } else {
             self.without_obstacles(&world, scenario, designation, folder)?
         };
+        let way_m = if self.obstacles { self.way_m(&world, designation)? } else { None };
         let command = self.command.clone();
         let mut drive = TargetedDrive::begin(world, designation, command, self.settings, Cancel::default())?;
         while drive.advance(self.settings, Cancel::default())? {}
-        Ok(drive.summary())
+        Ok((drive.summary(), way_m))
+    }
+
+    /// Length of a way over the true ground to the goal, m.
+    fn way_m(&self, begun: &DrivenTraverse, designation: Designation) -> Result<Option<f64>> {
+        let target = target_in_site(begun, designation)?;
+        let start = TruthSource::true_site_from_rover(begun.traverse(), 0).unwrap_or_default();
+        let goal_m = goal_position_m(self.command, &target, [start.translation.x, start.translation.y]);
+        let settings = (&HazardSettings::default(), &NavigatorSettings::default());
+        Ok(begun.traverse().world().and_then(|world| true_way_m(world, &start, goal_m, settings)))
     }
 
     /// The same world without high rocks on the way to the goal.
@@ -147,7 +166,7 @@ impl Drives<'_> {
 }
 
 /// The surface point under the target's pixel, site frame.
-fn target_in_site(world: &DrivenTraverse, designation: Designation) -> Result<Point3> {
+pub(crate) fn target_in_site(world: &DrivenTraverse, designation: Designation) -> Result<Point3> {
     let truth = TargetTruth::new(world.traverse(), designation, None);
     truth.map(|truth| truth.position_in_site()).ok_or_else(|| Error::Target("it has no surface".to_owned()))
 }
@@ -155,6 +174,7 @@ fn target_in_site(world: &DrivenTraverse, designation: Designation) -> Result<Po
 /// Sums up drives.
 pub fn outcome(drives: &[Drive]) -> Outcome {
     let made: Vec<DriveSummary> = drives.iter().filter_map(|drive| drive.summary).collect();
+    let with_way = || drives.iter().filter(|drive| drive.way_m.is_some()).filter_map(|drive| drive.summary);
     let arrived = || made.iter().filter(|summary| summary.arrived);
     let quantiles = |of: fn(&DriveSummary) -> Option<f64>, high: f64| {
         let mut values: Vec<f64> = arrived().filter_map(of).collect();
@@ -167,6 +187,7 @@ pub fn outcome(drives: &[Drive]) -> Outcome {
     Outcome {
         drives: made.len(),
         arrived: arrived().count(),
+        with_way: [with_way().count(), with_way().filter(|summary| summary.arrived).count()],
         tracked: made.iter().filter(|summary| summary.tracked == Some(true)).count(),
         collisions: made.iter().map(|summary| summary.collisions).sum(),
         target_error_m: quantiles(|summary| summary.target_error_m, 0.99),
@@ -190,19 +211,20 @@ mod tests {
             tracked: Some(arrived),
             flight_minutes: 20.0,
         };
-        Drive { seed: 1, summary: Some(summary), problem: None }
+        Drive { seed: 1, summary: Some(summary), problem: None, way_m: Some(8.0).filter(|_| arrived) }
     }
 
     #[test]
     fn errors_are_those_of_the_drives_that_arrived() {
         let mut drives: Vec<Drive> = (1..=100).map(|k| made(true, 0.001 * f64::from(k))).collect();
         drives.push(made(false, 9.0));
-        drives.push(Drive { seed: 2, summary: None, problem: Some("no target".to_owned()) });
+        drives.push(Drive { seed: 2, summary: None, problem: Some("no target".to_owned()), way_m: None });
         let outcome = outcome(&drives);
         assert_eq!(
             (outcome.drives, outcome.arrived, outcome.tracked, outcome.collisions),
             (101, 100, 100, 1)
         );
+        assert_eq!(outcome.with_way, [100, 100]);
         assert!((outcome.target_error_m[0] - 0.050).abs() < 1e-9);
         assert!((outcome.target_error_m[1] - 0.099).abs() < 1e-9);
         assert!((outcome.goal_error_m[1] - 0.190).abs() < 1e-9);

@@ -10,7 +10,9 @@
 //! | [`cancel`] | how soon each long computation ends once it is cancelled |
 //! | `claims` | tracked targets and their NEES in worlds with pointing error |
 //! | [`driving`] | closed-loop drives on slopes with slip |
+//! | `navigation` | the navigator among rocks without images, beside a planner that knows the ground |
 //! | [`spirit137`] | visual odometry along the path that Spirit drove at site 137 |
+//! | `true_ground` | the true ground as a navigator would know it, and whether a way leads over it |
 //! | [`trackability`] | targets drawn where the map says good, risky or bad, tracked against the truth |
 
 #[cfg(feature = "command-line")]
@@ -27,8 +29,11 @@ pub mod cancel;
 #[cfg(feature = "command-line")]
 pub mod claims;
 pub mod driving;
+#[cfg(feature = "command-line")]
+mod navigation;
 pub mod registration;
 pub mod spirit137;
 pub mod trackability;
+mod true_ground;
 #[cfg(feature = "command-line")]
 pub mod cli;

@@ -115,10 +115,14 @@ impl Driving {
 
 /// One line of the table.
 fn row(goal: GoalRule, outcome: &Outcome) -> String {
-    let Outcome { drives, arrived, tracked, collisions, target_error_m, goal_error_m } = outcome;
+    let Outcome { drives, arrived, with_way, tracked, collisions, target_error_m, goal_error_m } = outcome;
+    let of_way = match with_way {
+        [0, _] => String::new(),
+        [exists, arrived] => format!(" (of {exists} with a way over the true ground {arrived})"),
+    };
     let cm = |pair: &[f64; 2]| format!("{:.2} / {:.2} cm", 100.0 * pair[0], 100.0 * pair[1]);
     format!(
-        "{goal:?}: {arrived} of {drives} arrived, {tracked} tracked, {collisions} collisions; target error {} (median / 99 %), goal error {} (median / 95 %)",
+        "{goal:?}: {arrived} of {drives} arrived{of_way}, {tracked} tracked, {collisions} collisions; target error {} (median / 99 %), goal error {} (median / 95 %)",
         cm(target_error_m),
         cm(goal_error_m)
     )

@@ -3,6 +3,7 @@
 mod cancel;
 mod claims;
 mod driving;
+mod navigation;
 mod realism;
 mod scenery;
 mod scenery_figure;
@@ -30,6 +31,8 @@ enum Experiment {
     Claims(claims::Claimed),
     /// Closed-loop drives on slopes with slip: arrival, errors of target and goal, collisions.
     Driving(driving::Driving),
+    /// The navigator among rocks on exact range data, without images, beside a planner that knows the ground.
+    Navigation(navigation::Navigation),
     /// How hard the simulated worlds are: plain correlation, without scale and roll, at steps of 5 % and 23 %.
     Realism(realism::Worlds),
     /// The simulated scenery in numbers: rocks, ground, noise and texture against their laws and real frames.
@@ -53,6 +56,7 @@ pub fn run() -> ExitCode {
         Experiment::Cancel(arguments) => arguments.run(),
         Experiment::Claims(arguments) => arguments.run(),
         Experiment::Driving(arguments) => arguments.run(),
+        Experiment::Navigation(arguments) => arguments.run(),
         Experiment::Realism(arguments) => arguments.run(),
         Experiment::Scenery(arguments) => arguments.run(),
         Experiment::RealMotion(arguments) => arguments.run(),

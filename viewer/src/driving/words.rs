@@ -41,6 +41,7 @@ pub(super) fn reason(reason: StopReason) -> &'static str {
         StopReason::StopLimit => "all stops used up",
         StopReason::LimitCycle => "limit cycle",
         StopReason::NoSafePath => "no safe path",
+        StopReason::GoalBlocked => "goal on bad ground",
         StopReason::NoRangeData => "no range data",
     }
 }
@@ -137,7 +138,8 @@ pub(super) fn ending(ending: &Ending) -> String {
         | StopReason::Stalled
         | StopReason::Slip
         | StopReason::LimitCycle
-        | StopReason::NoSafePath => "",
+        | StopReason::NoSafePath
+        | StopReason::GoalBlocked => "",
     };
     if let Some(detail) = &ending.detail {
         return format!("{}: {detail}", reason(ending.reason));

@@ -53,6 +53,8 @@ pub enum StopReason {
     LimitCycle,
     /// Every path is vetoed by the hazard map.
     NoSafePath,
+    /// The rover cannot stand at its goal, and is at the nearest place where it can.
+    GoalBlocked,
     /// The pair of the hazard map is missing, or gives too few points.
     NoRangeData,
 }
@@ -63,12 +65,12 @@ pub struct Ending {
     /// Why it stopped.
     pub reason: StopReason,
     /// The value that decided, in the unit of its limit: m, a part, deg, min, a count; null for `lost`, `stalled`, `limit_cycle`
-    /// and `no_safe_path`, and for a missing pair.
+    /// and `no_safe_path`, and for a missing pair; of `goal_blocked` that of the ground at the goal.
     pub value: Option<f64>,
     /// The limit that it met; null where `value` is.
     pub limit: Option<f64>,
-    /// The reason in more detail: the smallest change of a limit that opens a path, why there are no range data, or which stops are
-    /// at one place; null for the other reasons.
+    /// The reason in more detail: the smallest change of a limit that opens a path, what is wrong with the goal, why there are no range
+    /// data, or which stops are at one place; null for the other reasons.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub detail: Option<String>,
 }

@@ -5,6 +5,7 @@ use utoipa::ToSchema;
 
 use super::motion::Motion;
 use crate::hazards::goodness::HazardTerm;
+use crate::navigation::stand::BlockedGoal;
 
 /// Terms of a path's vote, 0 (worst) to 1 each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -60,6 +61,9 @@ pub struct PathChoice {
     pub chosen: Option<usize>,
     /// Route to the goal over the map, x and y of the site frame, m; empty without a map.
     pub route_m: Vec<[f64; 2]>,
+    /// Why the rover cannot stand at its goal: it then drives to the nearest place where it can; null where it can.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub blocked_goal: Option<BlockedGoal>,
 }
 
 impl Candidate {
@@ -77,7 +81,7 @@ impl Candidate {
 impl PathChoice {
     /// The choice among one path.
     pub(crate) fn only(candidate: Candidate) -> Self {
-        Self { candidates: vec![candidate], chosen: Some(0), route_m: Vec::new() }
+        Self { candidates: vec![candidate], chosen: Some(0), ..Self::default() }
     }
 
     /// The chosen motion; `None` if no path is safe.

@@ -130,6 +130,25 @@ impl Circle {
 }
 
 impl HazardTerm {
+    /// Its word in a sentence.
+    pub(crate) const fn word(self) -> &'static str {
+        match self {
+            Self::Tilt => "tilt",
+            Self::Roughness => "roughness",
+            Self::Step => "step",
+            Self::Unknown => "unknown share",
+        }
+    }
+
+    /// A value of it with its unit.
+    pub(crate) fn text(self, value: f64) -> String {
+        match self {
+            Self::Tilt => format!("{value:.1}°"),
+            Self::Roughness | Self::Step => format!("{value:.3} m"),
+            Self::Unknown => format!("{:.0} %", 100.0 * value),
+        }
+    }
+
     /// The goodness of a value of this term, 0 to 1; of the certainty 1 from its limit on.
     fn goodness(self, value: f64, settings: &HazardSettings) -> f64 {
         let [ok, bad] = match self {

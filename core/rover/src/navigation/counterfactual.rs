@@ -49,19 +49,10 @@ impl LimitChange {
 
     /// The change as a sentence.
     pub fn sentence(&self) -> String {
-        let [raised, limit] = [self.raised, self.limit].map(|value| match self.term {
-            HazardTerm::Tilt => format!("{value:.1}°"),
-            HazardTerm::Roughness | HazardTerm::Step => format!("{value:.3} m"),
-            HazardTerm::Unknown => format!("{:.0} %", 100.0 * value),
-        });
-        let name = match self.term {
-            HazardTerm::Tilt => "a tilt limit",
-            HazardTerm::Roughness => "a roughness limit",
-            HazardTerm::Step => "a step limit",
-            HazardTerm::Unknown => "a limit of the unknown share",
-        };
+        let [raised, limit] = [self.raised, self.limit].map(|value| self.term.text(value));
+        let name = self.term.word();
         let plural = if self.opens.len() == 1 { "" } else { "s" };
-        format!("{name} of {raised} instead of {limit} opens {} path{plural}", self.opens.len())
+        format!("a {name} limit of {raised} instead of {limit} opens {} path{plural}", self.opens.len())
     }
 }
 

@@ -1,7 +1,7 @@
 //! Stage 9, `select_path`, on a goodness map: the navigator that drives round hazards, and why it did not take a path.
 //!
 //! ```text
-//! goodness map ─► ground (bad cells, clearance) ─► route to the goal ─► paths: veto, votes ─► choice ─► counterfactual
+//! goodness map ─► ground (bad cells, clearance) ─► route, way to the goal ─► paths: veto, votes ─► choice ─► counterfactual
 //! ```
 //! | file | content |
 //! |---|---|
@@ -10,6 +10,8 @@
 //! | `route` | goal layer: least cost to the goal |
 //! | `path` | footprint along a path, its veto and its hazard |
 //! | `navigator` | candidates, votes, choice |
+//! | `stand` | whether the rover can stand at its goal, and the nearest place where it can |
+//! | `way` | way to the goal: a search over positions and headings |
 //! | `counterfactual` | smallest change of a limit that opens paths |
 //!
 //! Frame: site, horizontal. Source: domain.md 8.
@@ -20,6 +22,8 @@ mod ground;
 mod route;
 mod path;
 pub mod navigator;
+pub mod stand;
+mod way;
 pub mod counterfactual;
 #[cfg(test)]
 mod tests;
@@ -29,3 +33,4 @@ mod drive_tests;
 pub use counterfactual::{LimitChange, counterfactual};
 pub use navigator::HazardNavigator;
 pub use settings::{NavigatorPreset, NavigatorSettings};
+pub use way::way;

@@ -1,24 +1,28 @@
 //! The navigator on the goodness map: candidate paths, their votes and the choice.
 //!
 //! ```text
-//! candidates   `curvature_count` arcs, and the arc or turn to a point `look_ahead_m` along the route;
+//! aim          the goal, or the nearest place to it where the rover can stand (`stand.rs`)
+//! manoeuvre    where the way to the aim (`way.rs`) begins with a turn or backwards, that motion alone
+//! candidates   else `curvature_count` arcs, and the arc or turn to a point `look_ahead_m` along the way
 //!              if that turn is vetoed: an arc backwards to that point
 //!              if none passes: a turn to either side, the least multiple of `turn_deg` after which an arc passes
 //!              if none passes: straight back by `back_up_m`
-//! goal         exp(−(Δψ/goal_width)²)     Δψ: heading at the end of the path against the route from there
+//! goal         exp(−(Δψ/goal_width)²)     Δψ: heading at the end of the path against the way from there
 //! steer        1 − |κ − κ_now|/(2 κ_max);  0 of a turn
-//! vote         w_h · hazard + w_g · goal + w_s · steer      the best path without a veto; ties: the smaller |κ|
+//! vote         w_h · hazard + w_g · goal + w_s · steer
+//! choice       the best vote without a veto among paths with goal ≥ `GOAL_MIN`, else among all; ties: the smaller |κ|
 //! ```
 //! | symbol | name | unit |
 //! |---|---|---|
 //! | κ, κ_now | curvature of the path, and of the motion before | 1/m |
 //! | κ_max | `curvature_max_per_m` | 1/m |
 //!
-//! A turn after which no arc passes has the veto of the arc that gets farthest: a rover in a closed pocket has no safe path, instead
-//! of turning for ever.
+//! Without a way the candidates follow the route (`route.rs`), and without a route the straight line. A turn after which no arc passes has
+//! the veto of the arc that gets farthest: a rover in a closed pocket has no safe path, instead of turning for ever.
 //!
-//! Departures from domain.md 8.2: the route, the arc or turn to it, the leading disc, turns that lead to an arc, backing up, and
-//! the lower quality of ground near bad cells. Without a map the choice is that of [`ArcNavigator`].
+//! Departures from domain.md 8.2: way and route, the arc or turn to them, paths that lead away from them only without another, the
+//! leading disc, turns that lead to an arc, backing up, and the lower quality of ground near bad cells. Without a map the choice
+//! is that of [`ArcNavigator`].
 //!
 //! Frame: site, horizontal. Source: domain.md 8.2; papers.md R9.
 
@@ -33,9 +37,15 @@ use super::limits::VetoLimits;
 use super::path::{Path, Stance};
 use super::route::Route;
 use super::settings::NavigatorSettings;
+use super::stand::Aim;
+use super::way::{self, STANCES_MAX, Search, Way};
 
-/// Nearer to the goal than this a path has arrived: its heading does not matter, m.
-const AT_GOAL_M: f64 = 0.02;
+/// Nearer to the end of the way's first part than this a path has arrived: its heading does not matter, m.
+const AT_END_M: f64 = 0.02;
+/// Nearer than this to the nearest place at a blocked goal the rover stays, m: about a cell.
+const AT_NEAREST_M: f64 = 0.15;
+/// A path of less agreement with the way leads away from it.
+const GOAL_MIN: f64 = 0.1;
 
 /// A navigator that avoids the hazards of a goodness map.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -63,23 +73,20 @@ impl HazardNavigator {
         let ground = Ground::new(map, VetoLimits::new(&map.settings, settings));
         let start = Stance::of(input.site_from_rover);
         let goal_m = start.place(input.goal_m);
-        let route = settings.has_route.then(|| Route::new(&ground, goal_m, settings));
-        let decision = Decision { settings, ground: &ground, input, start, goal_m, route };
-        let mut candidates: Vec<Candidate> =
-            decision.motions().iter().map(|motion| decision.judge(motion)).collect();
-        candidates.extend(decision.backwards(candidates.last()));
-        if is_blocked(&candidates) {
-            candidates.extend([-1.0, 1.0].map(|side| decision.turn_to_an_arc(side)));
+        let mut decision =
+            Decision { settings, ground: &ground, input, start, aim_m: goal_m, route: None, way: None };
+        let mut aim = Aim::of(&ground, goal_m, settings.reach_m);
+        if settings.has_route {
+            aim = decision.find_way(aim);
+        } else {
+            decision.aim_m = aim.at_m;
         }
-        if is_blocked(&candidates) && settings.back_up_m > 0.0 {
-            let back = Motion::Arc { length_m: -settings.back_up_m, curvature_per_m: 0.0 };
-            candidates.push(decision.judge(&back));
+        let blocked_goal = aim.blocked;
+        if blocked_goal.is_some() && distance_m(start.at_m, aim.at_m) <= AT_NEAREST_M {
+            return PathChoice { route_m: vec![start.at_m, goal_m], blocked_goal, ..PathChoice::default() };
         }
-        let route_m = decision
-            .route
-            .as_ref()
-            .map_or_else(|| vec![decision.start.at_m, goal_m], |route| route.points(decision.start.at_m));
-        PathChoice { chosen: best(&candidates), candidates, route_m }
+        let candidates = decision.candidates();
+        PathChoice { chosen: best(&candidates), candidates, route_m: decision.line(), blocked_goal }
     }
 }
 
@@ -88,12 +95,21 @@ fn is_blocked(candidates: &[Candidate]) -> bool {
     candidates.iter().all(|candidate| candidate.veto.is_some())
 }
 
-/// The index of the path with the highest vote among those without a veto; of equal votes, the straighter path.
+/// The index of the path with the highest vote among those without a veto, and if there are any, among those that do not lead away from
+/// the way; of equal votes, the straighter path.
 fn best(candidates: &[Candidate]) -> Option<usize> {
     let bend = |candidate: &Candidate| candidate.motion.curvature_per_m().abs();
-    let safe = candidates.iter().enumerate().filter(|(_, candidate)| candidate.veto.is_none());
-    let best = safe.min_by(|(_, a), (_, b)| b.vote.total_cmp(&a.vote).then(bend(a).total_cmp(&bend(b))));
+    let safe = || candidates.iter().enumerate().filter(|(_, candidate)| candidate.veto.is_none());
+    let leads_there = |candidate: &Candidate| candidate.terms.goal >= GOAL_MIN;
+    let is_led = safe().any(|(_, candidate)| leads_there(candidate));
+    let best = safe()
+        .filter(|(_, candidate)| leads_there(candidate) || !is_led)
+        .min_by(|(_, a), (_, b)| b.vote.total_cmp(&a.vote).then(bend(a).total_cmp(&bend(b))));
     best.map(|(index, _)| index)
+}
+
+fn distance_m(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
 /// What all paths of a decision have in common.
@@ -102,29 +118,97 @@ struct Decision<'a> {
     ground: &'a Ground<'a>,
     input: &'a PathInput<'a>,
     start: Stance,
-    goal_m: [f64; 2],
+    aim_m: [f64; 2],
     route: Option<Route<'a>>,
+    way: Option<Way>,
 }
 
-impl Decision<'_> {
-    fn goal_distance_m(&self) -> f64 {
-        self.input.goal_m[0].hypot(self.input.goal_m[1])
+impl<'a> Decision<'a> {
+    /// Sets route and way to an aim; where no way leads there, to the nearest place that one leads to.
+    fn find_way(&mut self, mut aim: Aim<'a>) -> Aim<'a> {
+        loop {
+            self.aim_m = aim.at_m;
+            let route = Route::new(self.ground, aim.at_m, self.settings);
+            let found = Way::search(&route, self.start, self.settings, STANCES_MAX);
+            let is_unfinished = matches!(found, Search::Unfinished);
+            let pocket = is_unfinished.then(|| way::pocket(&route, &self.start, self.settings)).flatten();
+            self.route = Some(route);
+            if let Some(other) = pocket.and_then(|pocket| aim.outside(&pocket)) {
+                aim = other;
+                continue;
+            }
+            if let Search::Nearest(way) = &found {
+                self.aim_m = way.end();
+                aim = aim.replaced_by(way.end());
+            }
+            self.way = match found {
+                Search::Found(way) | Search::Nearest(way) => Some(way),
+                Search::Unfinished => None,
+            };
+            return aim;
+        }
+    }
+
+    fn candidates(&mut self) -> Vec<Candidate> {
+        if let Some(candidate) = self.manoeuvre() {
+            if candidate.veto.is_none() {
+                return vec![candidate];
+            }
+            self.way = None;
+        }
+        let mut candidates: Vec<Candidate> = self.motions().iter().map(|motion| self.judge(motion)).collect();
+        candidates.extend(self.backwards(candidates.last()));
+        if is_blocked(&candidates) {
+            candidates.extend([-1.0, 1.0].map(|side| self.turn_to_an_arc(side)));
+        }
+        if is_blocked(&candidates) && self.settings.back_up_m > 0.0 {
+            let back = Motion::Arc { length_m: -self.settings.back_up_m, curvature_per_m: 0.0 };
+            candidates.push(self.judge(&back));
+        }
+        candidates
+    }
+
+    /// The motion with which the way begins, where that is a manoeuvre.
+    fn manoeuvre(&self) -> Option<Candidate> {
+        let candidate = self.judge(&self.way.as_ref()?.manoeuvre(self.input.step_m)?);
+        let terms = PathTerms { goal: 1.0, ..candidate.terms };
+        Some(Candidate { terms, vote: self.vote(&terms), ..candidate })
+    }
+
+    /// The way, the route or the straight line.
+    fn line(&self) -> Vec<[f64; 2]> {
+        match (&self.way, &self.route) {
+            (Some(way), _) => way.points().to_vec(),
+            (None, Some(route)) => route.points(self.start.at_m),
+            (None, None) => vec![self.start.at_m, self.aim_m],
+        }
+    }
+
+    /// Distance to the end of the way's first part, or of the aim, m.
+    fn end_distance_m(&self) -> f64 {
+        let aim_m = distance_m(self.start.at_m, self.aim_m);
+        self.way.as_ref().map_or(aim_m, |way| way.part_m().min(aim_m))
+    }
+
+    /// The end of the way's first part, or the aim.
+    fn end_m(&self) -> [f64; 2] {
+        self.way.as_ref().map_or(self.aim_m, Way::part_end)
     }
 
     /// Arcs, from the left to the right.
     fn arcs(&self) -> impl Iterator<Item = Motion> {
-        let length_m = self.input.step_m.min(self.goal_distance_m());
+        let length_m = self.input.step_m.min(self.end_distance_m());
         let (count, max) = (self.settings.curvature_count, self.settings.curvature_max_per_m);
         let curvature = move |k: u32| max * (2.0 * f64::from(k) / f64::from(count - 1) - 1.0);
         (0..count).map(move |k| Motion::Arc { length_m, curvature_per_m: curvature(k) })
     }
 
-    /// Arcs, and the motion to the route.
+    /// Arcs, and the motion to the way.
     fn motions(&self) -> Vec<Motion> {
         self.arcs().chain([self.to_route(ArcNavigator::default().reverse_max_m)]).collect()
     }
 
-    /// The arc or turn to the route; backwards if the route is behind within `reverse_max_m`.
+    /// The arc or turn to the way; backwards if it is behind within `reverse_max_m`.
     fn to_route(&self, reverse_max_m: f64) -> Motion {
         let navigator =
             ArcNavigator { curvature_max_per_m: self.settings.curvature_max_per_m, reverse_max_m };
@@ -132,7 +216,7 @@ impl Decision<'_> {
         navigator.motion(ahead_m, self.input.step_m)
     }
 
-    /// The arc backwards to the route, if the turn to it is vetoed.
+    /// The arc backwards to the way, if the turn to it is vetoed.
     fn backwards(&self, to_route: Option<&Candidate>) -> Option<Candidate> {
         let is_needed = |candidate: &&Candidate| {
             candidate.veto.is_some() && matches!(candidate.motion, Motion::Turn { .. })
@@ -168,32 +252,35 @@ impl Decision<'_> {
 
     /// The point that a path heads for at a position, site frame, m.
     fn ahead_of(&self, at_m: [f64; 2]) -> [f64; 2] {
-        match &self.route {
-            Some(route) => route.ahead(at_m, self.settings.look_ahead_m),
-            None => self.goal_m,
+        match (&self.way, &self.route) {
+            (Some(way), _) => way.ahead(at_m, self.settings.look_ahead_m),
+            (None, Some(route)) => route.ahead(at_m, self.settings.look_ahead_m),
+            (None, None) => self.aim_m,
         }
     }
 
     fn judge(&self, motion: &Motion) -> Candidate {
         let settings = self.settings;
-        let evaluated_min_m = settings.evaluated_min_m.min(self.goal_distance_m());
+        let evaluated_min_m = settings.evaluated_min_m.min(self.end_distance_m());
         let path = Path::new(self.ground, &self.start, motion, evaluated_min_m, settings);
         let goal = self.goal(motion, path.evaluated_m);
         let terms = PathTerms { hazard: path.hazard(), goal, steer: self.steer(motion) };
-        let vote = settings.hazard_weight * terms.hazard
-            + settings.goal_weight * terms.goal
-            + settings.steer_weight * terms.steer;
         Candidate {
             motion: *motion,
             evaluated_m: path.evaluated_m,
             terms,
-            vote,
+            vote: self.vote(&terms),
             unknown_share: path.unknown_share(),
             veto: path.veto(),
         }
     }
 
-    /// Agreement of the heading at the end of the evaluated path with the route from there.
+    fn vote(&self, terms: &PathTerms) -> f64 {
+        let NavigatorSettings { hazard_weight, goal_weight, steer_weight, .. } = self.settings;
+        hazard_weight * terms.hazard + goal_weight * terms.goal + steer_weight * terms.steer
+    }
+
+    /// Agreement of the heading at the end of the evaluated path with the way from there.
     fn goal(&self, motion: &Motion, evaluated_m: f64) -> f64 {
         let (part, sign) = match *motion {
             Motion::Arc { length_m, .. } => {
@@ -202,8 +289,7 @@ impl Decision<'_> {
             Motion::Turn { .. } => (1.0, 1.0),
         };
         let end = self.start.after(motion, part);
-        let [dx, dy] = [0, 1].map(|axis| self.goal_m[axis] - end.at_m[axis]);
-        if dx.hypot(dy) <= AT_GOAL_M {
+        if distance_m(end.at_m, self.end_m()) <= AT_END_M {
             return 1.0;
         }
         let [ahead, right] = end.seen(self.ahead_of(end.at_m));

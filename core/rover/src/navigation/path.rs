@@ -5,6 +5,7 @@
 //!
 //! ```text
 //! veto    if a term of a sample exceeds its limit, or more than `unknown_share_max` of the samples are unknown   (driven part)
+//!         backwards if any is unknown, or less certain than `back_certainty_min`
 //! hazard  = ω min q + (1 − ω) Σ q c/(1 + s) / Σ 1/(1 + s)                                                 (evaluated part)
 //! c       = certainty · ½^(age/age_half_life_m)
 //! ```
@@ -15,7 +16,7 @@
 //! | ω | `worst_weight`: ½ for GESTALT, 0 for Morphin | – |
 //!
 //! A rover that stands on bad cells may leave them: within `escape_m` a disc that was bad at the start may remain so as long as
-//! it gets no deeper into them.
+//! it gets no deeper into them and the motion brings it farther out. It may not turn there.
 //!
 //! Frame: site, horizontal. Source: domain.md 8.2.
 
@@ -63,6 +64,13 @@ impl Stance {
         let (moved, turned_rad) = motion.after(part);
         Self { at_m: self.place(moved), heading_rad: self.heading_rad + turned_rad }
     }
+
+    /// The stance from which a motion leads here.
+    pub(super) fn before(&self, motion: &Motion) -> Self {
+        let (moved, turned_rad) = motion.after(1.0);
+        let turned = Self { heading_rad: self.heading_rad - turned_rad, ..*self };
+        Self { at_m: turned.place(moved.map(|along| -along)), ..turned }
+    }
 }
 
 /// A disc of the footprint at one place of a path.
@@ -86,6 +94,7 @@ pub(super) struct Path<'a> {
     /// Clearance of each disc before the motion.
     start_m: [f64; 3],
     is_turn: bool,
+    is_backwards: bool,
     /// Length over which the hazard is evaluated, m; 0 of a turn.
     pub(super) evaluated_m: f64,
 }
@@ -124,7 +133,8 @@ impl<'a> Path<'a> {
             })
             .collect();
         let is_turn = matches!(motion, Motion::Turn { .. });
-        Self { settings, limits: ground.limits, ground, samples, start_m, is_turn, evaluated_m }
+        let is_backwards = matches!(*motion, Motion::Arc { length_m, .. } if length_m < 0.0);
+        Self { settings, limits: ground.limits, ground, samples, start_m, is_turn, is_backwards, evaluated_m }
     }
 
     fn driven(&self) -> impl Iterator<Item = &Sample> {
@@ -133,9 +143,9 @@ impl<'a> Path<'a> {
 
     /// Bad samples of the driven part that the rover may not pass, in the order of the distance.
     fn failing(&self) -> impl Iterator<Item = &Sample> {
-        let mut may_remain = self.start_m.map(|clearance_m| clearance_m < 0.0);
+        let mut may_remain = [0, 1, 2].map(|disc| self.start_m[disc] < 0.0 && self.leaves_bad_ground(disc));
         self.driven().filter(move |sample| {
-            let is_near = self.is_turn || sample.along_m <= self.settings.escape_m;
+            let is_near = !self.is_turn && sample.along_m <= self.settings.escape_m;
             let is_no_deeper = sample.spot.clearance_m >= self.start_m[sample.disc];
             let may_remain = &mut may_remain[sample.disc];
             *may_remain &= sample.spot.is_bad() && is_near && is_no_deeper;
@@ -143,11 +153,40 @@ impl<'a> Path<'a> {
         })
     }
 
+    /// Whether a disc is less deep in bad cells after the motion than before it.
+    fn leaves_bad_ground(&self, disc: usize) -> bool {
+        let last = self.driven().filter(|sample| sample.disc == disc).last();
+        last.is_some_and(|sample| sample.spot.clearance_m > self.start_m[disc])
+    }
+
+    /// Whether the rover may not pass a measured cell of the driven part, or one that is uncertain behind it.
+    pub(super) fn is_bad(&self) -> bool {
+        self.failing().next().is_some() || (self.is_backwards && self.unknown_share() > 0.0)
+    }
+
+    /// The ground under the rover's origin along the path.
+    pub(super) fn centres(&self) -> impl Iterator<Item = Spot> {
+        self.samples.iter().filter(|sample| sample.disc == 0).map(|sample| sample.spot)
+    }
+
+    /// Whether the ground of a sample counts as unknown; backwards also where little of its disc was seen.
+    fn is_unknown(&self, sample: &Sample) -> bool {
+        let cell = &sample.spot.cell;
+        let is_uncertain = f64::from(cell.certainty) < self.settings.back_certainty_min;
+        cell.basis == CellBasis::Unknown
+            || (self.is_backwards && cell.basis == CellBasis::Measured && is_uncertain)
+    }
+
     /// Share of unknown samples of the driven part, 0 to 1.
     pub(super) fn unknown_share(&self) -> f64 {
         let count = self.driven().count().max(1);
-        let unknown = self.driven().filter(|sample| sample.spot.cell.basis == CellBasis::Unknown).count();
+        let unknown = self.driven().filter(|sample| self.is_unknown(sample)).count();
         unknown as f64 / count as f64
+    }
+
+    /// Largest share of unknown samples; backwards none, because no camera looks there.
+    fn unknown_limit(&self) -> f64 {
+        if self.is_backwards { 0.0 } else { self.limits.unknown_share }
     }
 
     /// The first failing cell; `None` for a path that may be driven.
@@ -158,14 +197,14 @@ impl<'a> Path<'a> {
         });
         let unknown_share = self.unknown_share();
         let (sample, term, value) = measured.or_else(|| {
-            let is_unknown = |sample: &&Sample| sample.spot.cell.basis == CellBasis::Unknown;
-            let first =
-                self.driven().find(is_unknown).filter(|_| unknown_share > self.limits.unknown_share)?;
+            let is_unknown = |sample: &&Sample| self.is_unknown(sample);
+            let first = self.driven().find(is_unknown).filter(|_| unknown_share > self.unknown_limit())?;
             Some((first, HazardTerm::Unknown, unknown_share))
         })?;
         // A sample outside the window has no cell.
         let in_site_m = sample.spot.index.map_or(sample.at_m, |index| self.ground.map.grid.centre_m(index));
-        Some(Veto { in_site_m, along_m: sample.along_m, term, value, limit: self.limits.of(term) })
+        let limit = if term == HazardTerm::Unknown { self.unknown_limit() } else { self.limits.of(term) };
+        Some(Veto { in_site_m, along_m: sample.along_m, term, value, limit })
     }
 
     /// The largest value of a term among the failing cells; the share of unknown samples for `unknown`.

@@ -19,7 +19,7 @@ use std::collections::BinaryHeap;
 
 use crate::hazards::goodness::CellBasis;
 
-use super::ground::Ground;
+use super::ground::{Ground, Spot};
 use super::settings::NavigatorSettings;
 
 /// Largest cost of ground that is not bad, from its least quality.
@@ -29,8 +29,10 @@ const STEPS_MAX: usize = 2000;
 
 /// Least cost from every cell to a goal.
 pub(super) struct Route<'a> {
-    ground: &'a Ground<'a>,
-    goal_m: [f64; 2],
+    pub(super) ground: &'a Ground<'a>,
+    pub(super) goal_m: [f64; 2],
+    /// F, row by row.
+    costs: Vec<f32>,
     /// T, in metres of good ground, row by row.
     cost_m: Vec<f32>,
 }
@@ -58,7 +60,23 @@ impl<'a> Route<'a> {
             (0..grid.len()).filter(is_border).map(|index| (index, distance(index) * unknown_cost)).collect()
         };
         let cost_m = march(&costs, side, grid.cell_m as f32, &seeds);
-        Self { ground, goal_m, cost_m }
+        Self { ground, goal_m, costs, cost_m }
+    }
+
+    /// T at a position; `None` outside the window.
+    pub(super) fn cost_at(&self, at_m: [f64; 2]) -> Option<f64> {
+        self.ground.map.grid.index_at(at_m)?;
+        Some(self.interpolated(at_m))
+    }
+
+    /// Mean of F over spots; 1 outside the window.
+    pub(super) fn mean_cost(&self, spots: impl Iterator<Item = Spot>) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for spot in spots {
+            sum += spot.index.map_or(1.0, |index| f64::from(self.costs[index]));
+            count += 1.0;
+        }
+        if count > 0.0 { sum / count } else { 1.0 }
     }
 
     /// The point that is `length_m` along the route from a position; the goal if the route ends before.

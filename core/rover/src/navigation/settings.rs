@@ -40,6 +40,8 @@ settings_group! {
         goodness_min: f64 = 0.15, "", Domain::Between(0.0, 0.99), "ours, after Goldberg02";
         /// A path is vetoed of which a larger share of cells is unknown, within the driven part.
         unknown_share_max: f64 = 0.30, "", Domain::Between(0.0, 1.0), "ours, after Goldberg02";
+        /// A path backwards is vetoed on ground of less certainty: no camera looks there.
+        back_certainty_min: f64 = 0.8, "", Domain::Between(0.0, 1.0), "ours";
         /// Weight of the hazard in the vote.
         hazard_weight: f64 = 0.6, "", Domain::Between(0.0, 1.0), "ours, after Goldberg02";
         /// Weight of the goal in the vote.

@@ -1,0 +1,143 @@
+//! Where the rover heads for: its goal, or the nearest place to it where it can stand and that is not enclosed.
+//!
+//! It can stand where the disc at its origin and, in one of `HEADINGS` directions, the leading one are on no bad cell (`path.rs`). Unknown
+//! cells count as good: they become known on the way there. A place is enclosed if the way to it cannot begin outside a small pocket
+//! (`way.rs`).
+//!
+//! Frame: site, m.
+
+use std::collections::HashSet;
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::hazards::goodness::HazardTerm;
+
+use super::ground::{Ground, Spot};
+use super::path::Stance;
+use super::way::square_of;
+
+const HEADINGS: u32 = 24;
+/// Other places are looked for up to this distance from the goal, m.
+const SEARCH_M: f64 = 3.0;
+/// Most enclosed places that are left out.
+const POCKETS_MAX: usize = 4;
+
+/// A goal that the rover cannot reach, as far as its map shows.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct BlockedGoal {
+    /// The ground on which it cannot stand there; null if the goal is on good ground that bad ground encloses.
+    pub ground: Option<BadGround>,
+    /// The nearest place for which it heads instead, x and y of the site frame, m; null if there is none within 3 m.
+    pub nearest_m: Option<[f64; 2]>,
+    /// Its distance from the goal, m; null without one.
+    pub nearest_from_goal_m: Option<f64>,
+}
+
+/// Ground beyond a limit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct BadGround {
+    /// The term.
+    pub term: HazardTerm,
+    /// Its value: deg, m, m.
+    pub value: f64,
+    /// Its limit, in the same unit.
+    pub limit: f64,
+}
+
+/// Where the rover heads for.
+#[derive(Clone)]
+pub(super) struct Aim<'a> {
+    ground: &'a Ground<'a>,
+    goal_m: [f64; 2],
+    reach_m: f64,
+    pockets: Vec<HashSet<[i64; 2]>>,
+    /// Site frame, m.
+    pub(super) at_m: [f64; 2],
+    /// Why that is not the goal.
+    pub(super) blocked: Option<BlockedGoal>,
+}
+
+impl<'a> Aim<'a> {
+    /// The goal, or the nearest place to it where the rover can stand; the goal if there is none.
+    pub(super) fn of(ground: &'a Ground<'a>, goal_m: [f64; 2], reach_m: f64) -> Self {
+        let aim = Self { ground, goal_m, reach_m, pockets: Vec::new(), at_m: goal_m, blocked: None };
+        match aim.bad_spot(goal_m) {
+            Some(spot) => aim.elsewhere(Some(spot)),
+            None => aim,
+        }
+    }
+
+    /// The nearest other place, outside a pocket that encloses this one; `None` if there is none.
+    pub(super) fn outside(&self, pocket: &HashSet<[i64; 2]>) -> Option<Self> {
+        let mut other = self.clone();
+        other.pockets.push(pocket.clone());
+        let bad = self.bad_spot(self.goal_m);
+        let other = other.elsewhere(bad);
+        let is_new = other.blocked.is_some_and(|blocked| blocked.nearest_m.is_some());
+        (is_new && other.pockets.len() <= POCKETS_MAX).then_some(other)
+    }
+
+    /// The same with another place, the nearest one that a way leads to.
+    pub(super) fn replaced_by(self, at_m: [f64; 2]) -> Self {
+        let from_goal_m = (at_m[0] - self.goal_m[0]).hypot(at_m[1] - self.goal_m[1]);
+        let ground = self.blocked.and_then(|blocked| blocked.ground);
+        let blocked = BlockedGoal { ground, nearest_m: Some(at_m), nearest_from_goal_m: Some(from_goal_m) };
+        Self { at_m, blocked: Some(blocked), ..self }
+    }
+
+    fn elsewhere(self, bad: Option<Spot>) -> Self {
+        let grid = &self.ground.map.grid;
+        let distance = |at: [f64; 2]| (at[0] - self.goal_m[0]).hypot(at[1] - self.goal_m[1]);
+        let is_enclosed = |at: [f64; 2]| self.pockets.iter().any(|pocket| pocket.contains(&square_of(at)));
+        let nearest_m = (0..grid.len())
+            .map(|index| grid.centre_m(index))
+            .filter(|at| distance(*at) <= SEARCH_M && !is_enclosed(*at) && self.bad_spot(*at).is_none())
+            .min_by(|a, b| distance(*a).total_cmp(&distance(*b)));
+        let limits = &self.ground.limits;
+        let ground = bad.and_then(|spot| {
+            let term = limits.exceeded(&spot.cell)?;
+            Some(BadGround { term, value: spot.cell.value(term), limit: limits.of(term) })
+        });
+        let blocked = BlockedGoal { ground, nearest_m, nearest_from_goal_m: nearest_m.map(distance) };
+        Self { at_m: nearest_m.unwrap_or(self.goal_m), blocked: Some(blocked), ..self }
+    }
+
+    /// The bad ground that keeps the rover from standing at a place; `None` if it can.
+    fn bad_spot(&self, at_m: [f64; 2]) -> Option<Spot> {
+        let centre = self.ground.spot(at_m);
+        if centre.is_bad() {
+            return Some(centre);
+        }
+        let mut last = None;
+        for number in 0..HEADINGS {
+            let heading_rad = std::f64::consts::TAU * f64::from(number) / f64::from(HEADINGS);
+            let ahead = self.ground.spot(Stance { at_m, heading_rad }.place([self.reach_m, 0.0]));
+            if !ahead.is_bad() {
+                return None;
+            }
+            last = Some(ahead);
+        }
+        last
+    }
+}
+
+impl BlockedGoal {
+    /// The reason as a sentence.
+    pub fn sentence(&self) -> String {
+        let why = match self.ground {
+            Some(BadGround { term, value, limit }) => format!(
+                "the rover cannot stand at its goal, where the {} is {}, limit {}",
+                term.word(),
+                term.text(value),
+                term.text(limit)
+            ),
+            None => "bad ground encloses the goal".to_owned(),
+        };
+        let place = match self.nearest_from_goal_m {
+            Some(from_goal_m) => format!("it is at the nearest safe place, {from_goal_m:.2} m from the goal"),
+            None => format!("no place within {SEARCH_M:.0} m of it is safe"),
+        };
+        format!("{why}; {place}")
+    }
+}
