@@ -13,6 +13,7 @@
 //! | clearance | 2 × 2 passes over 25,600 cells | 0.5 ms |
 //! | route | 25,600 cells from a heap, some 100 ns each | 2.5 ms |
 //! | paths | 24 paths × 24 samples × 2 discs | 0.1 ms |
+//! | way | 30 to 12,000 stances × 8 motions × 12 samples, 10 ns each | 0.03 to 12 ms |
 //!
 //! Run with `cargo bench -p sightline-core --profile dev --bench hazards` (the profile `dev` is optimised); measured times:
 //! `docs/benchmarks.md`.
@@ -127,6 +128,24 @@ fn path(bencher: Bencher<'_, '_>) {
     let map = scene.goodness(&scene.hazards(&scene.points(), None), &pose);
     let input = input(&map, &pose);
     let navigator = HazardNavigator::default();
+    bencher.bench_local(|| navigator.select_path(&input));
+}
+
+/// A path where no way leads to the goal: a wall encloses it, and the search goes on elsewhere.
+#[divan::bench]
+fn path_to_an_enclosed_goal(bencher: Bencher<'_, '_>) {
+    let scene = scene();
+    let pose = scene.world.traverse().site_from_rover(0);
+    let mut points = scene.points();
+    for number in 0..720 {
+        let (sine, cosine) = (f64::from(number) * std::f64::consts::TAU / 720.0).sin_cos();
+        let ring = |height_m: f64| Point3::new(6.0 + 1.6 * cosine, 1.0 + 1.6 * sine, 0.3 - height_m);
+        points.extend([ring(0.0), ring(0.5)]);
+    }
+    let map = scene.goodness(&scene.hazards(&points, None), &pose);
+    let input = input(&map, &pose);
+    let navigator = HazardNavigator::default();
+    assert!(navigator.select_path(&input).blocked_goal.is_some());
     bencher.bench_local(|| navigator.select_path(&input));
 }
 

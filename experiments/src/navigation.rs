@@ -154,7 +154,7 @@ impl Rover<'_> {
             };
             let choice = navigator.select_path(&input);
             let Some(motion) = choice.motion() else {
-                let end = if choice.candidates.is_empty() { "goal_blocked" } else { "no_safe_path" };
+                let end = if choice.stays_for().is_some() { "goal_blocked" } else { "no_safe_path" };
                 return Ok(Drive { end, ..drive });
             };
             let (motion_m, turn_rad) = followed(&motion);

@@ -7,6 +7,7 @@ use sightline_geometry::camera::CameraName;
 use sightline_geometry::cancel::Cancel;
 use sightline_recordings::DrivenTraverse;
 use sightline_rover::driving::executive::{self, CycleInput};
+use sightline_rover::driving::set_goal::goal_position_m;
 use sightline_rover::driving::{
     Cycle, DriveCommand, GoalRule, NavigatorKind, PathChoice, RangeData, StopHazards, StopReason,
 };
@@ -146,4 +147,29 @@ fn without_range_data_or_a_safe_path_the_rover_stays_and_says_why() {
     assert_eq!(blocked.reason, StopReason::NoSafePath);
     let sentence = blocked.detail.unwrap();
     assert!(sentence.contains("a step limit of 0.250 m instead of 0.182 m opens"), "{sentence}");
+}
+
+#[test]
+fn a_drive_whose_goal_is_a_rock_ends_beside_it_and_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut drive =
+        begin(&scenario(), command(NavigatorKind::Gestalt), &folder.path().join("drive")).unwrap();
+    let traverse = drive.world.traverse();
+    let mut rocks = traverse.world().unwrap().rocks().iter();
+    let rock = rocks.find(|rock| rock.height_m > 0.35 && (1.0..4.0).contains(&rock.centre.x)).unwrap().centre;
+    let target = traverse.site_from_rover(0) * drive.steps[0].trace.update.target.position_in_rover;
+    let goal = goal_position_m(&drive.command, &target, [0.0, 0.0]);
+    drive.command.offset_m = [rock.x - goal[0], rock.y - goal[1]];
+    to_end(&mut drive);
+    let summary = drive.summary();
+    assert_eq!((summary.reason, summary.collisions), (Some(StopReason::GoalBlocked), 0), "{summary:?}");
+    let cycle = drive.cycles.last().unwrap();
+    let ending = cycle.ending.as_ref().unwrap();
+    let detail = ending.detail.as_deref().unwrap();
+    assert!(detail.starts_with("the rover cannot stand at its goal, where the step is "), "{detail}");
+    assert!(ending.value.unwrap() > ending.limit.unwrap());
+    let blocked = cycle.choice.as_ref().unwrap().blocked_goal.unwrap();
+    assert!((0.7..2.0).contains(&blocked.nearest_from_goal_m.unwrap()), "{blocked:?}");
+    let nearest_m = blocked.nearest_from_goal_m.unwrap();
+    assert!((cycle.goal.distance_m - nearest_m).abs() < 0.31, "{} {nearest_m}", cycle.goal.distance_m);
 }

@@ -44,7 +44,8 @@ fn driving(context: &egui::Context) -> State {
     let veto =
         json!({ "in_site_m": [0.2, 0.2], "along_m": 0.4, "term": "step", "value": 0.21, "limit": 0.18 });
     let choice = json!({ "candidates": [path(0.0, veto), path(0.0625, json!(null))], "chosen": 1,
-        "route_m": [[2.0, 0.2], [4.0, 0.5]] });
+        "route_m": [[2.0, 0.2], [4.0, 0.5]],
+        "blocked_goal": { "ground": { "term": "step", "value": 0.4, "limit": 0.182 }, "nearest_m": [4.0, 0.5], "nearest_from_goal_m": 1.2 } });
     let cycles: Vec<_> = (0..=STEP)
         .map(|step| {
             let mut cycle = fixture::cycle(step);
@@ -132,4 +133,5 @@ fn the_inspector_lists_every_path_with_its_vote_or_its_first_failing_cell() {
     });
     shown.says("1 of 2 paths are not vetoed").says("radius 16 m right (chosen)");
     shown.says("step 21.0 cm at 0.40 m, limit 18.0 cm").says("0.85");
+    shown.says("the rover cannot stand at its goal, where the step is 0.400 m, limit 0.182 m; it heads for the nearest place");
 }

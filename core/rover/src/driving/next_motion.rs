@@ -45,8 +45,8 @@ pub(super) fn choose(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &mut Cycl
             cycle.motion = Some(motion);
             cycle.odometry_alone = is_part && input.command.tracked_stops == TrackedStops::ByDistance;
         }
-        None if choice.blocked_goal.is_some() && choice.candidates.is_empty() => {
-            cycle.ending = choice.blocked_goal.as_ref().map(|blocked| Ending {
+        None if choice.stays_for().is_some() => {
+            cycle.ending = choice.stays_for().map(|blocked| Ending {
                 value: blocked.ground.map(|ground| ground.value),
                 limit: blocked.ground.map(|ground| ground.limit),
                 ..Ending::named(StopReason::GoalBlocked, Some(blocked.sentence()))

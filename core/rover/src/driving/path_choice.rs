@@ -89,6 +89,12 @@ impl PathChoice {
         Some(self.candidates.get(self.chosen?)?.motion)
     }
 
+    /// Why the rover stays where it is although there are safe paths: it cannot reach its goal, and is as near as it can be.
+    pub fn stays_for(&self) -> Option<&BlockedGoal> {
+        let is_free = self.candidates.iter().any(|candidate| candidate.veto.is_none());
+        self.blocked_goal.as_ref().filter(|_| self.chosen.is_none() && is_free)
+    }
+
     /// Number of paths that must not be driven.
     pub fn vetoed_count(&self) -> usize {
         self.candidates.iter().filter(|candidate| candidate.veto.is_some()).count()

@@ -174,3 +174,22 @@ fn a_trap_open_to_the_start_is_left_and_driven_round() {
         assert!(driven.arrived && driven.clearance_m > 0.0, "{view:?}: {driven:?}");
     }
 }
+
+#[test]
+fn a_goal_before_a_rock_is_reached_from_the_side() {
+    let rocks = [Rock { at: [6.15, 0.0], radius: 0.3, height: 0.4 }];
+    let preset = NavigatorPreset::Gestalt;
+    let drive = Drive { rocks: &rocks, view: [4.0, 1.05], preset, goal: [5.0, 0.0], error: [0.02, 0.01] };
+    let driven = drive.run(3);
+    assert!(driven.arrived && driven.clearance_m > 0.0 && driven.driven_m < 10.0, "{driven:?}");
+}
+
+#[test]
+fn a_rover_whose_goal_is_inside_a_rock_ends_beside_it() {
+    let rocks = [Rock { at: [5.0, 0.2], radius: 0.4, height: 0.4 }];
+    let preset = NavigatorPreset::Gestalt;
+    let drive = Drive { rocks: &rocks, view: [4.0, 1.05], preset, goal: [5.0, 0.0], error: [0.02, 0.01] };
+    let driven = drive.run(3);
+    assert!(!driven.arrived && driven.stops < 30 && driven.clearance_m > 0.0, "{driven:?}");
+    assert!((3.5..6.0).contains(&driven.driven_m), "{driven:?}");
+}

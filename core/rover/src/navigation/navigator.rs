@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! aim          the goal, or the nearest place to it where the rover can stand (`stand.rs`)
-//! manoeuvre    where the way to the aim (`way.rs`) begins with a turn or backwards, that motion alone
-//! candidates   else `curvature_count` arcs, and the arc or turn to a point `look_ahead_m` along the way
+//! manoeuvre    the turn or motion backwards with which the way to the aim (`way.rs`) begins; it is chosen
+//! candidates   `curvature_count` arcs, and the arc or turn to a point `look_ahead_m` along the way
 //!              if that turn is vetoed: an arc backwards to that point
 //!              if none passes: a turn to either side, the least multiple of `turn_deg` after which an arc passes
 //!              if none passes: straight back by `back_up_m`
@@ -42,8 +42,6 @@ use super::way::{self, STANCES_MAX, Search, Way};
 
 /// Nearer to the end of the way's first part than this a path has arrived: its heading does not matter, m.
 const AT_END_M: f64 = 0.02;
-/// Nearer than this to the nearest place at a blocked goal the rover stays, m: about a cell.
-const AT_NEAREST_M: f64 = 0.15;
 /// A path of less agreement with the way leads away from it.
 const GOAL_MIN: f64 = 0.1;
 
@@ -82,11 +80,26 @@ impl HazardNavigator {
             decision.aim_m = aim.at_m;
         }
         let blocked_goal = aim.blocked;
-        if blocked_goal.is_some() && distance_m(start.at_m, aim.at_m) <= AT_NEAREST_M {
-            return PathChoice { route_m: vec![start.at_m, goal_m], blocked_goal, ..PathChoice::default() };
+        let stays = blocked_goal.is_some_and(|blocked| blocked.is_near(distance_m(start.at_m, goal_m)));
+        let route_m = decision.line();
+        let manoeuvre = decision.manoeuvre().filter(|_| !stays);
+        if stays || decision.way.as_ref().is_some_and(Way::begins_with_manoeuvre) {
+            // Arcs cannot follow it: they are judged by the route.
+            decision.way = None;
         }
-        let candidates = decision.candidates();
-        PathChoice { chosen: best(&candidates), candidates, route_m: decision.line(), blocked_goal }
+        if stays {
+            decision.aim_m = goal_m;
+        }
+        let mut candidates = decision.candidates();
+        let chosen = match manoeuvre {
+            _ if stays => None,
+            Some(manoeuvre) => {
+                candidates.push(manoeuvre);
+                Some(candidates.len() - 1)
+            }
+            None => best(&candidates),
+        };
+        PathChoice { chosen, candidates, route_m, blocked_goal }
     }
 }
 
@@ -149,13 +162,7 @@ impl<'a> Decision<'a> {
         }
     }
 
-    fn candidates(&mut self) -> Vec<Candidate> {
-        if let Some(candidate) = self.manoeuvre() {
-            if candidate.veto.is_none() {
-                return vec![candidate];
-            }
-            self.way = None;
-        }
+    fn candidates(&self) -> Vec<Candidate> {
         let mut candidates: Vec<Candidate> = self.motions().iter().map(|motion| self.judge(motion)).collect();
         candidates.extend(self.backwards(candidates.last()));
         if is_blocked(&candidates) {
@@ -168,11 +175,11 @@ impl<'a> Decision<'a> {
         candidates
     }
 
-    /// The motion with which the way begins, where that is a manoeuvre.
+    /// The motion with which the way begins, where that is a manoeuvre without a veto.
     fn manoeuvre(&self) -> Option<Candidate> {
         let candidate = self.judge(&self.way.as_ref()?.manoeuvre(self.input.step_m)?);
         let terms = PathTerms { goal: 1.0, ..candidate.terms };
-        Some(Candidate { terms, vote: self.vote(&terms), ..candidate })
+        Some(Candidate { terms, vote: self.vote(&terms), ..candidate }).filter(|path| path.veto.is_none())
     }
 
     /// The way, the route or the straight line.

@@ -1,7 +1,7 @@
 //! A path over the ground: samples of its footprint, its veto and its hazard.
 //!
 //! The rover is covered by two discs of its radius, one at its origin and a leading one `reach_m` ahead of it, or behind when it
-//! backs up; a turn has one on either side. The goodness of a cell is that of the disc around it, so that each disc is one cell.
+//! backs up; a turn has one on either side, and so has a tight arc, at whose begin the rear wheels swing outwards. The goodness of a cell is that of the disc around it, so that each disc is one cell.
 //!
 //! ```text
 //! veto    if a term of a sample exceeds its limit, or more than `unknown_share_max` of the samples are unknown   (driven part)
@@ -30,6 +30,9 @@ use super::settings::NavigatorSettings;
 
 /// Angle of two samples of a turn, rad.
 const TURN_SAMPLE_RAD: f64 = 10.0 * std::f64::consts::PI / 180.0;
+
+/// Curvature from which on an arc is tight, 1/m: the rear corners then swing out by 8 cm and more, the margin of the discs.
+const TIGHT_PER_M: f64 = 0.35;
 
 /// Position and heading of the rover in the level.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -251,7 +254,11 @@ impl<'a> Path<'a> {
 fn offsets(motion: &Motion, reach_m: f64) -> Vec<f64> {
     match *motion {
         Motion::Turn { .. } => vec![0.0, reach_m, -reach_m],
-        Motion::Arc { length_m, .. } => vec![0.0, reach_m.copysign(length_m)],
+        Motion::Arc { length_m, curvature_per_m } => {
+            let leading_m = reach_m.copysign(length_m);
+            let is_tight = curvature_per_m.abs() >= TIGHT_PER_M;
+            if is_tight { vec![0.0, leading_m, -leading_m] } else { vec![0.0, leading_m] }
+        }
     }
 }
 

@@ -20,6 +20,9 @@ use super::way::square_of;
 const HEADINGS: u32 = 24;
 /// Other places are looked for up to this distance from the goal, m.
 const SEARCH_M: f64 = 3.0;
+/// The rover stays if it is no more than this farther from the goal than the nearest place, m: on another side of a rock there is always a
+/// place that seems a little nearer.
+const NEAR_M: f64 = 0.3;
 /// Most enclosed places that are left out.
 const POCKETS_MAX: usize = 4;
 
@@ -123,9 +126,9 @@ impl<'a> Aim<'a> {
 }
 
 impl BlockedGoal {
-    /// The reason as a sentence.
-    pub fn sentence(&self) -> String {
-        let why = match self.ground {
+    /// What is wrong with the goal.
+    pub fn why(&self) -> String {
+        match self.ground {
             Some(BadGround { term, value, limit }) => format!(
                 "the rover cannot stand at its goal, where the {} is {}, limit {}",
                 term.word(),
@@ -133,11 +136,22 @@ impl BlockedGoal {
                 term.text(limit)
             ),
             None => "bad ground encloses the goal".to_owned(),
-        };
-        let place = match self.nearest_from_goal_m {
-            Some(from_goal_m) => format!("it is at the nearest safe place, {from_goal_m:.2} m from the goal"),
-            None => format!("no place within {SEARCH_M:.0} m of it is safe"),
-        };
-        format!("{why}; {place}")
+        }
+    }
+
+    /// Whether a rover at this distance from the goal, m, is as near as it can be.
+    pub(super) fn is_near(&self, from_goal_m: f64) -> bool {
+        self.nearest_from_goal_m.is_some_and(|nearest_m| from_goal_m <= nearest_m + NEAR_M)
+    }
+
+    /// Why the rover stays where it is.
+    pub fn sentence(&self) -> String {
+        let why = self.why();
+        match self.nearest_from_goal_m {
+            Some(from_goal_m) => format!(
+                "{why}; the nearest place that it can reach is {from_goal_m:.2} m from the goal, and it is at most {NEAR_M} m farther away"
+            ),
+            None => format!("{why}; no place within {SEARCH_M:.0} m of the goal is safe"),
+        }
     }
 }

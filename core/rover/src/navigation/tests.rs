@@ -117,17 +117,129 @@ fn a_blocked_corridor_has_no_safe_path() {
 }
 
 #[test]
-fn a_route_ends_at_a_goal_beside_bad_ground() {
+fn a_line_ends_at_a_goal_beside_bad_ground() {
     let stance = pose([0.0, 0.0], 0.0);
     let rocks = [Rock { at: [3.0, 0.1], radius: 0.35, height: 0.4 }];
     let map = known(&stance, &HazardSettings::default(), |x, y| rocks_height(&rocks, x, y));
-    // From well beside the rock to a cell whose disc touches it.
-    for goal in [[4.3, 0.0], [4.0, 0.0], [3.0, 1.4], [3.0, 0.1]] {
-        let route = select(NavigatorPreset::Gestalt, &map, &stance, goal, 0.6).route_m;
-        assert_eq!(route.last(), Some(&goal));
-        let steps = route.windows(2).map(|pair| (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]));
+    // From well beside the rock to a cell whose disc nearly touches it.
+    for goal in [[4.6, 0.0], [4.4, 0.0], [3.0, 1.5]] {
+        let choice = select(NavigatorPreset::Gestalt, &map, &stance, goal, 0.6);
+        assert_eq!(choice.blocked_goal, None);
+        let line = choice.route_m;
+        assert!(distance(line[line.len() - 1], goal) < 1e-6, "{goal:?}: {:?}", line.last());
+        let steps = line.windows(2).map(|pair| distance(pair[0], pair[1]));
         let length_m: f64 = steps.sum();
-        assert!(length_m < goal[0].hypot(goal[1]) + 2.0, "{goal:?}: {length_m} m, {} points", route.len());
+        assert!(length_m < goal[0].hypot(goal[1]) + 2.0, "{goal:?}: {length_m} m, {} points", line.len());
+    }
+}
+
+fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+#[test]
+fn a_goal_inside_a_rock_is_replaced_by_the_nearest_place_to_it() {
+    let rocks = [Rock { at: [3.0, 0.1], radius: 0.35, height: 0.4 }];
+    let stance = pose([0.0, 0.0], 0.0);
+    let map = known(&stance, &HazardSettings::default(), |x, y| rocks_height(&rocks, x, y));
+    let choice = select(NavigatorPreset::Gestalt, &map, &stance, [3.0, 0.1], 0.6);
+    let blocked = choice.blocked_goal.unwrap();
+    let ground = blocked.ground.unwrap();
+    assert_eq!((ground.term, ground.limit), (HazardTerm::Step, 0.182));
+    assert!((ground.value - 0.4).abs() < 0.01, "{ground:?}");
+    // The disc of 0.8 m, by whole cells, is clear of the rock.
+    let nearest = blocked.nearest_m.unwrap();
+    assert!((1.05..1.35).contains(&distance(nearest, [3.0, 0.1])), "{nearest:?}");
+    assert!((distance(nearest, [3.0, 0.1]) - blocked.nearest_from_goal_m.unwrap()).abs() < 1e-9);
+    assert!(choice.motion().is_some() && choice.stays_for().is_none());
+    assert!(distance(choice.route_m[choice.route_m.len() - 1], nearest) < 1e-6);
+    // There the rover stays, although it could drive elsewhere.
+    let there = pose(nearest, 0.0);
+    let choice = select(NavigatorPreset::Gestalt, &map, &there, [3.0, 0.1], 0.6);
+    let sentence = choice.stays_for().unwrap().sentence();
+    assert!(sentence.starts_with(
+        "the rover cannot stand at its goal, where the step is 0.400 m, limit 0.182 m; the nearest"
+    ));
+    assert_eq!(choice.motion(), None);
+}
+
+#[test]
+fn a_goal_within_a_ring_of_rocks_is_enclosed() {
+    let ring: Vec<Rock> = (0..16)
+        .map(|k| {
+            let (sine, cosine) = (f64::from(k) * std::f64::consts::TAU / 16.0).sin_cos();
+            Rock { at: [3.5 + 1.7 * cosine, 1.7 * sine], radius: 0.25, height: 0.4 }
+        })
+        .collect();
+    let stance = pose([0.0, 0.0], 0.0);
+    let map = known(&stance, &HazardSettings::default(), |x, y| rocks_height(&ring, x, y));
+    let choice = select(NavigatorPreset::Gestalt, &map, &stance, [3.5, 0.0], 0.6);
+    let blocked = choice.blocked_goal.unwrap();
+    assert_eq!(blocked.ground, None, "the goal itself is on good ground");
+    assert!(blocked.nearest_from_goal_m.unwrap() > 2.5, "outside the ring: {blocked:?}");
+    assert!(blocked.sentence().starts_with("bad ground encloses the goal; the nearest place"));
+    assert!(choice.motion().is_some());
+    // With a gate in it there is a way.
+    let gate: Vec<Rock> = ring.iter().copied().filter(|rock| rock.at[1] < 1.0).collect();
+    let map = known(&stance, &HazardSettings::default(), |x, y| rocks_height(&gate, x, y));
+    let choice = select(NavigatorPreset::Gestalt, &map, &stance, [3.5, 0.0], 0.6);
+    assert_eq!(choice.blocked_goal, None);
+    assert!(choice.motion().is_some());
+}
+
+#[test]
+fn a_way_passes_no_bad_cell_and_ends_at_the_goal() {
+    // A rock behind the goal: straight ahead the leading disc would touch it.
+    let rocks = [Rock { at: [4.4, 0.0], radius: 0.3, height: 0.4 }];
+    let stance = pose([0.0, 0.0], 0.0);
+    let map = known(&stance, &HazardSettings::default(), |x, y| rocks_height(&rocks, x, y));
+    let settings = NavigatorSettings::default();
+    let goal = [3.2, 0.0];
+    let motions = way(&map, &stance, goal, &settings).unwrap();
+    let mut at = stance;
+    for motion in &motions {
+        let start = at;
+        for k in 1..=40 {
+            let (moved, turned_rad) = motion.after(f64::from(k) / 40.0);
+            at = start * pose(moved, turned_rad);
+            for ahead in [0.0, settings.reach_m] {
+                let disc = at * Point3::new(ahead, 0.0, 0.0);
+                let step_m = f64::from(map.cell_at([disc.x, disc.y]).unwrap().step_m);
+                // Backwards it is the other disc.
+                let is_back = matches!(*motion, Motion::Arc { length_m, .. } if length_m < 0.0);
+                assert!(step_m <= 0.182 || (is_back && ahead > 0.0), "{motion:?} {k}: {step_m} m");
+            }
+        }
+    }
+    assert!(distance([at.translation.x, at.translation.y], goal) < 1e-6);
+    let heading_rad = at.rotation.euler_angles().2;
+    assert!(heading_rad.abs() > 0.3, "it comes from the side: {heading_rad}");
+    // Among walls there is none.
+    let closed = |x: f64, y: f64| if x.abs() > 1.5 || y.abs() > 1.5 { -0.5 } else { 0.0 };
+    let map = known(&stance, &HazardSettings::default(), closed);
+    assert_eq!(way(&map, &stance, goal, &settings), None);
+}
+
+#[test]
+fn the_rover_does_not_back_up_over_ground_that_it_has_not_seen() {
+    let stance = pose([0.0, 0.0], 0.0);
+    let settings = HazardSettings::default();
+    // A wall ahead and to both sides.
+    let walls = |x: f64, y: f64| if x > 1.25 || y.abs() > 1.15 { -0.5 } else { 0.0 };
+    for (half_field_rad, backs_up) in [(4.0, true), (1.6, false)] {
+        let points = seen(&stance, 6.0, half_field_rad, walls);
+        let scan = Scan { points_in_rover: &points, site_from_rover: &stance, driven_m: 0.0, noise: None };
+        let map = assess(&map_hazards(None, &scan, &settings), &MapRules::default(), &settings);
+        let choice = select(NavigatorPreset::Gestalt, &map, &stance, [-4.0, 0.0], 0.6);
+        assert_eq!(choice.motion().is_some(), backs_up, "{choice:?}");
+        if !backs_up {
+            let back = choice
+                .candidates
+                .iter()
+                .find(|path| matches!(path.motion, Motion::Arc { length_m, .. } if length_m < 0.0));
+            let veto = back.unwrap().veto.unwrap();
+            assert_eq!((veto.term, veto.limit), (HazardTerm::Unknown, 0.0));
+        }
     }
 }
 
@@ -165,7 +277,8 @@ fn a_rover_on_bad_cells_may_leave_them_but_not_go_deeper() {
 fn check_changes(settings: &HazardSettings, height: fn(f64, f64) -> f64, expected: HazardTerm) {
     let stance = pose([0.0, 0.0], 0.3);
     let map = known(&stance, settings, height);
-    let navigator = NavigatorPreset::Gestalt.settings();
+    // With a way the arcs would be as short as the ground allows.
+    let navigator = NavigatorSettings { has_route: false, ..NavigatorPreset::Gestalt.settings() };
     let input = PathInput {
         goal_m: [5.0, 0.0],
         step_m: 0.7,

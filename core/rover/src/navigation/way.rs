@@ -31,7 +31,7 @@ const CELL_M: f64 = 0.15;
 const HEADING_DEG: f64 = 15.0;
 const STEP_M: f64 = 0.3;
 const CURVATURES: [f64; 5] = [0.0, -0.5, 0.5, -1.0, 1.0];
-const TURN_M_PER_RAD: f64 = 0.3;
+const TURN_M_PER_RAD: f64 = 1.0;
 const LAST_M: f64 = 1.5;
 const PART_TURN_DEG: f64 = 10.0;
 /// Distance of the points of a way, m.
@@ -171,6 +171,11 @@ impl Way {
     /// Its end, site frame, m.
     pub(super) fn end(&self) -> [f64; 2] {
         self.points[self.points.len() - 1]
+    }
+
+    /// Whether it begins with a turn or backwards.
+    pub(super) fn begins_with_manoeuvre(&self) -> bool {
+        self.part == 1
     }
 
     /// The turn or the motion backwards, of at most `step_m`, with which it begins; `None` where it begins ahead.
