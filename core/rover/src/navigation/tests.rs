@@ -113,7 +113,10 @@ fn a_blocked_corridor_has_no_safe_path() {
     // Open to the rear, the rover backs up or turns.
     let dead_end = |x: f64, y: f64| if x > 1.25 || y.abs() > 1.15 { -0.5 } else { 0.0 };
     let map = known(&stance, &HazardSettings::default(), dead_end);
-    assert!(select(NavigatorPreset::Gestalt, &map, &stance, [5.0, 0.0], 0.6).motion().is_some());
+    assert!(select(NavigatorPreset::Gestalt, &map, &stance, [-4.0, 0.0], 0.6).motion().is_some());
+    // Towards a goal that it cannot reach it stays.
+    let ahead = select(NavigatorPreset::Gestalt, &map, &stance, [5.0, 0.0], 0.6);
+    assert!(ahead.motion().is_none() && ahead.stays_for().is_some());
 }
 
 #[test]
