@@ -44,22 +44,24 @@ fn colour(candidate: &Candidate) -> egui::Color32 {
 pub(crate) fn table(ui: &mut Ui, choice: &PathChoice) {
     let count = choice.candidates.len();
     let open = count - choice.vetoed_count();
-    ui.label(theme::note(format!(
-        "{open} of {count} paths are not vetoed; vote = weighted sum of goodness, goal and steering; a turn or motion backwards with which \
-         the way to the goal begins is chosen without a vote"
-    )));
-    if let Some(blocked) = &choice.blocked_goal {
-        let heads_for = match blocked.nearest_from_goal_m {
-            Some(distance_m) => {
-                format!(
-                    "; it heads for the nearest place that it can reach, {} m from the goal",
-                    fixed(distance_m, 2)
-                )
-            }
-            None => String::new(),
-        };
-        ui.label(theme::label(format!("{}{heads_for}", blocked.why())).color(theme::failed()));
-    }
+    // The rows above may be wider than the panel.
+    let width = (ui.clip_rect().right() - ui.cursor().left() - 8.0).max(120.0);
+    ui.scope(|ui| {
+        ui.set_max_width(width);
+        ui.label(theme::note(format!(
+            "{open} of {count} paths are not vetoed; vote = weighted sum of goodness, goal and steering; a turn or motion backwards with \
+             which the way to the goal begins is chosen without a vote"
+        )));
+        if let Some(blocked) = &choice.blocked_goal {
+            let heads_for = match blocked.nearest_from_goal_m {
+                Some(distance_m) => {
+                    format!("; the nearest place that it can reach is {} m from the goal", fixed(distance_m, 2))
+                }
+                None => String::new(),
+            };
+            ui.label(theme::label(format!("{}{heads_for}", blocked.why())).color(theme::failed()));
+        }
+    });
     ScrollArea::horizontal().id_salt("paths").show(ui, |ui| {
         Grid::new("paths").num_columns(6).striped(true).spacing([10.0, 2.0]).show(ui, |ui| {
             for head in ["path", "vote", "goodness", "goal", "steering", "first failing cell"] {

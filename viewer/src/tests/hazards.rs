@@ -133,5 +133,5 @@ fn the_inspector_lists_every_path_with_its_vote_or_its_first_failing_cell() {
     });
     shown.says("1 of 2 paths are not vetoed").says("radius 16 m right (chosen)");
     shown.says("step 21.0 cm at 0.40 m, limit 18.0 cm").says("0.85");
-    shown.says("the rover cannot stand at its goal, where the step is 0.400 m, limit 0.182 m; it heads for the nearest place");
+    shown.says("the rover cannot stand at its goal, where the step is 0.400 m, limit 0.182 m; the nearest place that it can reach is 1.20 m");
 }
