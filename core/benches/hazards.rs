@@ -137,10 +137,10 @@ fn path_to_an_enclosed_goal(bencher: Bencher<'_, '_>) {
     let scene = scene();
     let pose = scene.world.traverse().site_from_rover(0);
     let mut points = scene.points();
-    for number in 0..720 {
-        let (sine, cosine) = (f64::from(number) * std::f64::consts::TAU / 720.0).sin_cos();
-        let ring = |height_m: f64| Point3::new(6.0 + 1.6 * cosine, 1.0 + 1.6 * sine, 0.3 - height_m);
-        points.extend([ring(0.0), ring(0.5)]);
+    for (row, column) in (-50..50).flat_map(|row| (-50..50).map(move |column| (row, column))) {
+        let (x, y) = (0.06 * f64::from(row), 0.06 * f64::from(column));
+        let height_m = if (1.4..1.9).contains(&x.hypot(y)) { 0.8 } else { 0.0 };
+        points.push(Point3::new(6.0 + x, 1.0 + y, 0.3 - height_m));
     }
     let map = scene.goodness(&scene.hazards(&points, None), &pose);
     let input = input(&map, &pose);

@@ -191,5 +191,5 @@ fn a_rover_whose_goal_is_inside_a_rock_ends_beside_it() {
     let drive = Drive { rocks: &rocks, view: [4.0, 1.05], preset, goal: [5.0, 0.0], error: [0.02, 0.01] };
     let driven = drive.run(3);
     assert!(!driven.arrived && driven.stops < 30 && driven.clearance_m > 0.0, "{driven:?}");
-    assert!((3.5..6.0).contains(&driven.driven_m), "{driven:?}");
+    assert!((3.5..8.0).contains(&driven.driven_m), "{driven:?}");
 }

@@ -3,7 +3,7 @@
 //! ```text
 //! stance      position and heading; of stances in one square of `CELL_M` and one sector of `HEADING_DEG` the first one counts
 //! motions     arcs of `STEP_M` ahead with `CURVATURES` times the tightest curvature, straight back, turns of `HEADING_DEG`
-//! at the goal within `LAST_M`: the turn that faces the goal, and straight ahead to it
+//! at the goal within `LAST_M`: one arc, backwards within `LAST_BACKWARDS_M`, or the turn that faces the goal and straight ahead to it
 //! order       A*: Σ F Δs + `TURN_M_PER_RAD` Σ |Δψ| and T from there (F, T: `route.rs`)
 //! ```
 //! The first part of a way ends before its first turn of more than `PART_TURN_DEG` or motion backwards: arcs can follow it.
@@ -19,6 +19,7 @@ use std::collections::{BinaryHeap, HashSet};
 use sightline_geometry::frames::Pose;
 
 use crate::driving::motion::Motion;
+use crate::driving::select_path::ArcNavigator;
 use crate::hazards::goodness::GoodnessMap;
 
 use super::ground::Ground;
@@ -33,6 +34,7 @@ const STEP_M: f64 = 0.3;
 const CURVATURES: [f64; 5] = [0.0, -0.5, 0.5, -1.0, 1.0];
 const TURN_M_PER_RAD: f64 = 1.0;
 const LAST_M: f64 = 1.5;
+const LAST_BACKWARDS_M: f64 = 0.5;
 const PART_TURN_DEG: f64 = 10.0;
 /// Distance of the points of a way, m.
 const POINT_M: f64 = 0.05;
@@ -273,12 +275,18 @@ impl Moves<'_> {
         arcs.chain([arc(-STEP_M, 0.0)]).chain(turns)
     }
 
-    /// The last motions in reverse order, if the goal is near and they are safe.
+    /// The last motions in reverse order, if the goal is near and they are safe: one arc, or a turn and a straight line.
     fn last(&self, stance: &Stance) -> Option<Vec<Motion>> {
         let [ahead, right] = stance.seen(self.route.goal_m);
         let length_m = ahead.hypot(right);
         if length_m > LAST_M {
             return None;
+        }
+        let curvature_max_per_m = self.settings.curvature_max_per_m;
+        let navigator = ArcNavigator { curvature_max_per_m, reverse_max_m: LAST_BACKWARDS_M };
+        let arc = navigator.motion([ahead, right], f64::INFINITY);
+        if matches!(arc, Motion::Arc { .. }) && self.cost(stance, &arc).is_some() {
+            return Some(vec![arc]);
         }
         let turn = Motion::Turn { angle_rad: right.atan2(ahead) };
         let straight = Motion::Arc { length_m, curvature_per_m: 0.0 };
