@@ -53,7 +53,7 @@ pub enum StopReason {
     LimitCycle,
     /// Every path is vetoed by the hazard map.
     NoSafePath,
-    /// The rover cannot stand at its goal, and is at the nearest place where it can.
+    /// The rover cannot reach its goal, and is about as near to it as it can be.
     GoalBlocked,
     /// The pair of the hazard map is missing, or gives too few points.
     NoRangeData,

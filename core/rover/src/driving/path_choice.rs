@@ -61,7 +61,7 @@ pub struct PathChoice {
     pub chosen: Option<usize>,
     /// Route to the goal over the map, x and y of the site frame, m; empty without a map.
     pub route_m: Vec<[f64; 2]>,
-    /// Why the rover cannot stand at its goal: it then drives to the nearest place where it can; null where it can.
+    /// Why the rover cannot reach its goal and drives to the nearest place that it can reach; null where it can reach the goal.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub blocked_goal: Option<BlockedGoal>,
 }

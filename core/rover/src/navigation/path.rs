@@ -1,7 +1,8 @@
 //! A path over the ground: samples of its footprint, its veto and its hazard.
 //!
 //! The rover is covered by two discs of its radius, one at its origin and a leading one `reach_m` ahead of it, or behind when it
-//! backs up; a turn has one on either side, and so has a tight arc, at whose begin the rear wheels swing outwards. The goodness of a cell is that of the disc around it, so that each disc is one cell.
+//! backs up. A turn has one on either side. So has a tight arc: as it begins, the rear wheels swing outwards. The goodness of a
+//! cell is that of the disc around it, so that each disc is one cell.
 //!
 //! ```text
 //! veto    if a term of a sample exceeds its limit, or more than `unknown_share_max` of the samples are unknown   (driven part)

@@ -126,7 +126,7 @@ impl<'a> Aim<'a> {
 }
 
 impl BlockedGoal {
-    /// What is wrong with the goal.
+    /// Why the goal cannot be reached.
     pub fn why(&self) -> String {
         match self.ground {
             Some(BadGround { term, value, limit }) => format!(

@@ -8,8 +8,8 @@
 //! ```
 //! The first part of a way ends before its first turn of more than `PART_TURN_DEG` or motion backwards: arcs can follow it.
 //!
-//! Every motion is subject to the vetoes of [`super::navigator`], except that of unknown ground: what is far away becomes known on the
-//! way there. A gap between rocks that needs a stance between two squares may be missed.
+//! Every motion is subject to the vetoes of [`super::navigator`], except that of unknown ground, because distant ground becomes known as
+//! the rover approaches it. A gap between rocks that needs a stance between two squares may be missed.
 //!
 //! Frame: site, horizontal. Source: hybrid A* [Dolgov08].
 
