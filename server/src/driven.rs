@@ -17,6 +17,7 @@ use sightline_session::Run;
 use sightline_session::driving::{self, DriveView, Steering};
 use sightline_session::hazard_view::HazardView;
 use sightline_session::step::RunStep;
+use sightline_session::stop_cause::Explained;
 use sightline_track::cycle_stage::CycleStage;
 use sightline_track::locate::store::Cache;
 use tokio::sync::broadcast;
@@ -29,6 +30,7 @@ use crate::live_session::LiveSession;
 use crate::naming::slug;
 use crate::problem::{ApiError, ApiResult};
 use crate::rendering::OpenTraverse;
+use crate::rerun_log::DriveLog;
 use crate::shared_world::SharedWorld;
 
 /// The open traverses, those that were opened from a page last.
@@ -39,6 +41,8 @@ pub(crate) struct Driven {
     world: Mutex<DrivenTraverse>,
     /// Hazard maps of the stops; locked before `world`, never while it is held.
     maps: Mutex<HazardMaps>,
+    /// Why the drive stopped; locked between these two.
+    explained: Mutex<Explained>,
     cache: Arc<Cache>,
 }
 
@@ -78,8 +82,12 @@ pub(crate) fn open(
 ) -> Result<OpenTraverse> {
     let traverse = world.snapshot()?.with_cache(cache);
     let name = traverse.folder().file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let driven =
-        Arc::new(Driven { world: Mutex::new(world), maps: Mutex::default(), cache: Arc::clone(cache) });
+    let driven = Arc::new(Driven {
+        world: Mutex::new(world),
+        maps: Mutex::default(),
+        explained: Mutex::default(),
+        cache: Arc::clone(cache),
+    });
     Ok(OpenTraverse::new(Identity::driven(name), traverse, events.clone()).driven_in(driven))
 }
 
@@ -301,7 +309,27 @@ pub(crate) fn view(live: &LiveSession) -> DriveView {
         // Never cancelled.
         let _mapped = map_hazards(&open, &steering.command, missing, &mut maps, Cancel::default());
     }
-    driven.with(|world| DriveView::of(world, steering, &run, &mut maps, is_driving))
+    let mut explained = lock(&driven.explained);
+    driven.with(|world| DriveView::of(world, steering, &run, (&mut maps, &mut explained), is_driving))
+}
+
+/// The drive of a session as a Rerun recording has it, with the hazard maps that are kept; `None` where nobody drives.
+pub(crate) fn log(live: &LiveSession) -> Option<DriveLog> {
+    let DriveView { steering, cycles, why, .. } = view(live);
+    let command = steering?.command;
+    let open = live.traverse();
+    let driven = open.driven.as_ref()?;
+    let (_, run) = steered(live);
+    let run = run?;
+    let steps = run.whole_steps();
+    let first = steps.first()?;
+    let mut maps = lock(&driven.maps);
+    let hazards = steps.iter().map_while(|step| {
+        let pair = [&first.trace, &step.trace];
+        maps.at(&open.traverse, &command, pair, Cancel::default()).ok().flatten()
+    });
+    let hazards = hazards.collect();
+    Some(DriveLog { cycles, hazards, tolerance_m: command.tolerance_m, why })
 }
 
 /// The goodness map at a stop of the drive of a session.

@@ -141,7 +141,7 @@ fn a_recording_has_the_images_and_pyramids_of_further_cameras() {
     let last = steps.len() as i64 - 1;
     let run = RunLog { target: 0, run: 0, label: "rock", steps: &steps };
     let path = folder.path().join("cameras.rrd");
-    export(&path, "cameras", &traverse, &[run], &mut |_, _| ControlFlow::Continue(())).unwrap();
+    export(&path, "cameras", &traverse, (&[run], None), &mut |_, _| ControlFlow::Continue(())).unwrap();
     let recording = rrd::read(&path);
     let data = |entity: &str| {
         let mut steps = recording.entities.get(entity).map_or_else(Vec::new, |rows| rows.data.clone());

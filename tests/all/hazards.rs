@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 use sightline_recordings::{Traverse, create_simulated};
+use sightline_tests::rrd;
 use sightline_tests::scenario::rock_on_the_way;
 use sightline_tests::server::{TestServer, small_drive};
 use sightline_world::choose_targets;
@@ -55,6 +56,25 @@ async fn the_map_of_a_stop_has_the_rock_for_which_paths_were_vetoed() {
         assert!((0..16).contains(&goodness), "a failing cell at {north} {east} has the goodness {goodness}");
         assert_eq!(map["limited_by"][index], "step");
     }
+    let file = folder.path().join("drive.rrd");
+    let exported = server.get(&format!("sessions/{session}/exports/recording.rrd")).await;
+    std::fs::write(&file, exported.bytes).unwrap();
+    let recording = rrd::read(&file);
+    let rows = |part: &str| &recording.entities[&format!("/drive/{part}")];
+    for (part, archetype) in [
+        ("set_goal/goal", "Points3D"),
+        ("map_hazards/ground", "Mesh3D"),
+        ("select_path/paths", "LineStrips3D"),
+        ("select_path/way", "LineStrips3D"),
+        ("decision", "TextLog"),
+    ] {
+        assert!(rows(part).archetypes.contains(archetype), "{part}: {:?}", rows(part).archetypes);
+        assert!(rows(part).data.contains(&(step as i64)), "{part}: {:?}", rows(part).data);
+    }
+    let corners = &rows("map_hazards/ground").numbers[&("Mesh3D:vertex_positions".to_owned(), step as i64)];
+    let known = map["basis"].as_array().unwrap().iter().filter(|basis| **basis != "unknown").count();
+    // Cells that are assumed to be good have no height where nothing was measured.
+    assert!(corners.len() > 12 * known / 2 && corners.len() <= 12 * known, "{} {known}", corners.len());
     let later = server.get(&format!("sessions/{session}/drive/steps/99/hazards")).await;
     assert!(later.problem(404, "not_found").contains("has not come to step 99"));
 }

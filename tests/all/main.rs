@@ -45,6 +45,7 @@ mod page_picking;
 mod page_recordings;
 mod page_removal;
 mod page_sizes;
+mod page_stop_cause;
 mod page_speed;
 mod page_travel;
 mod page_trackers;

@@ -59,8 +59,10 @@ impl Fixture {
     fn exported(&self) -> Recording {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("short.rrd");
-        export(&path, "short approach", &self.drive, &self.logs(), &mut |_, _| ControlFlow::Continue(()))
-            .unwrap();
+        export(&path, "short approach", &self.drive, (&self.logs(), None), &mut |_, _| {
+            ControlFlow::Continue(())
+        })
+        .unwrap();
         assert_eq!(names(folder.path()), ["short.rrd"], "nothing else may be left behind");
         rrd::read(&path)
     }
@@ -170,7 +172,7 @@ fn exported_as_promised(steps: &[Arc<RunStep>]) -> rrd::Recording {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.rrd");
     let runs = [RunLog { target: 0, run: 0, label: "rock", steps }];
-    export(&path, "short", &FIXTURE.drive, &runs, &mut |_, _| ControlFlow::Continue(())).unwrap();
+    export(&path, "short", &FIXTURE.drive, (&runs, None), &mut |_, _| ControlFlow::Continue(())).unwrap();
     let recording = rrd::read(&path);
     for doc in entities_of(&root(0, 0)) {
         let (found, expected) = (&recording.entities[&doc.path], promised(doc.rows, &doc, steps));
@@ -267,7 +269,7 @@ fn a_cancelled_export_leaves_nothing_and_an_existing_file_is_kept() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("short.rrd");
     let mut seen = Vec::new();
-    let cancelled = export(&path, "short", &FIXTURE.drive, &FIXTURE.logs(), &mut |done, all| {
+    let cancelled = export(&path, "short", &FIXTURE.drive, (&FIXTURE.logs(), None), &mut |done, all| {
         seen.push((done, all));
         if done == 2 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
@@ -278,7 +280,13 @@ fn a_cancelled_export_leaves_nothing_and_an_existing_file_is_kept() {
 
     std::fs::write(&path, "mine").unwrap();
     let refused =
-        export(&path, "short", &FIXTURE.drive, &FIXTURE.logs(), &mut |_, _| ControlFlow::Continue(()));
+        export(
+            &path,
+            "short",
+            &FIXTURE.drive,
+            (&FIXTURE.logs(), None),
+            &mut |_, _| ControlFlow::Continue(()),
+        );
     assert!(matches!(refused, Err(Error::Write { .. })), "{refused:?}");
     assert_eq!(std::fs::read_to_string(&path).unwrap(), "mine");
 }
@@ -302,7 +310,7 @@ fn exports_and_live_targets_leave_no_threads_behind() {
     for _ in 0..TIMES {
         FIXTURE.exported();
         session.add_target(None, Settings::default(), Arc::clone(&FIXTURE.runs[0][0]));
-        while !live.advance("short approach", &FIXTURE.drive, &session).unwrap().is_empty() {}
+        while !live.advance("short approach", &FIXTURE.drive, &session, None).unwrap().is_empty() {}
     }
     let after = stream_threads();
     assert!(after < before + 2 * TIMES, "{before} threads of streams, then {after}");
@@ -319,7 +327,7 @@ fn a_live_recording_grows_step_by_step_to_the_exported_one() {
     let mut read_all = |session: &Session, bytes: &mut Vec<u8>| {
         let mut batches = 0;
         loop {
-            let batch = live.advance("short approach", &FIXTURE.drive, session).unwrap();
+            let batch = live.advance("short approach", &FIXTURE.drive, session, None).unwrap();
             if batch.is_empty() {
                 return batches;
             }

@@ -40,7 +40,7 @@ use sightline_world::camera::exposure::{Rates, automatic, fixed_of_further_s, fi
 use sightline_world::moment::Moment;
 use sightline_world::scenario::ExposureMode;
 use sightline_world::traverse::{Stop, TraverseIndex, View};
-use sightline_world::{Eye, NoiseSeed, Region, Scenario, World, clean_radiance, develop_until};
+use sightline_world::{Eye, NoiseSeed, Region, Scenario, World, add_ghosts, clean_radiance, develop_until};
 
 /// Pixels of a kept picture that are rendered anew before it is believed.
 const PROBES: u32 = 16;
@@ -197,15 +197,24 @@ impl Simulated {
         let moment = Moment::of(step, &stops.index.stops).ok_or_else(|| Error::Request(needs_truth(step)))?;
         let world = self.world_until(cancel.into())?.at(&moment, &self.scenario);
         let render = |region: Region| clean_radiance(&world, &self.scenario, &camera, region, cancel);
+        let with_ghosts = |mut radiance: GrayImage| {
+            if let Some(name) = picture.0 {
+                let at = (name, moment.stop);
+                add_ghosts(&mut radiance, &self.scenario, at, &camera, &moment.site_from_rover);
+            }
+            radiance
+        };
         let key = render_cache::key(&self.scenario, &stop_key(&moment, &stops.index.stops[step]), &camera);
         if let Some(kept) = self.cache.load(&key, &camera)
             && renders_alike(&kept, render)?
         {
+            let kept = with_ghosts(kept);
             return Ok((camera, kept));
         }
         let radiance = render(Region::whole(&camera))?;
         self.rendered.fetch_add(1, Ordering::Relaxed);
         self.cache.store(&key, &radiance);
+        let radiance = with_ghosts(radiance);
         Ok((camera, radiance))
     }
 

@@ -11,6 +11,7 @@ use utoipa::ToSchema;
 use crate::Run;
 use crate::pause::{self, Halt, StagePause};
 use crate::step::RunStep;
+use crate::stop_cause::{Explained, StopExplanation};
 use crate::track;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
@@ -54,6 +55,9 @@ pub struct DriveView {
     pub cycles: Vec<Cycle>,
     /// The outcome so far; null before the first command.
     pub summary: Option<DriveSummary>,
+    /// Why the drive stopped; null while it goes on, and where it has arrived.
+    #[serde(default)]
+    pub why: Option<StopExplanation>,
     /// Whether the next stop is being computed, or waits for it.
     pub is_driving: bool,
     /// The place at which the drive waits; null while it drives, once it has ended, and where its run was stopped.
@@ -67,7 +71,7 @@ impl DriveView {
         world: &DrivenTraverse,
         steering: &Steering,
         run: &Run,
-        maps: &mut HazardMaps,
+        (maps, explained): (&mut HazardMaps, &mut Explained),
         is_driving: bool,
     ) -> Self {
         let mut cycles = cycles(world, &steering.command, run.whole_steps(), maps);
@@ -76,7 +80,8 @@ impl DriveView {
         let goes_on = !is_driving && summary.reason.is_none() && run.why_stopped().is_none();
         let halted = || pause::halted(steering, &run.steps, world.traverse().stop_count());
         let paused = goes_on.then(halted).flatten();
-        Self { steering: Some(steering.clone()), cycles, summary: Some(summary), is_driving, paused }
+        let why = explained.of(world.traverse(), &steering.command, run.whole_steps(), &cycles, maps);
+        Self { steering: Some(steering.clone()), cycles, summary: Some(summary), why, is_driving, paused }
     }
 }
 
@@ -193,6 +198,12 @@ impl TargetedDrive {
     /// The outcome so far.
     pub fn summary(&self) -> DriveSummary {
         summary(&self.world, &self.command, &self.steps, &self.cycles)
+    }
+
+    /// Why the drive stopped; `None` while it goes on, and where it has arrived.
+    pub fn why(&mut self) -> Option<StopExplanation> {
+        let (traverse, maps) = (self.world.traverse(), &mut self.maps);
+        Explained::default().of(traverse, &self.command, &self.steps, &self.cycles, maps)
     }
 }
 

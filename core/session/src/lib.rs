@@ -34,6 +34,7 @@ pub mod breakpoints;
 pub mod query;
 pub mod replayed_drive;
 pub mod reproduce;
+pub mod stop_cause;
 pub mod times;
 #[cfg(test)]
 mod breakpoint_tests;

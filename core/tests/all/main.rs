@@ -17,6 +17,7 @@ mod driving_hazards;
 mod driving_odometry;
 mod terrain_odometry;
 mod stage_pause;
+mod stop_causes;
 mod registration;
 mod stereo_rendered;
 mod stereo_recorded;

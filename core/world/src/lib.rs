@@ -29,6 +29,7 @@
 //!                shading         the light of that, many at once
 //!                optics          point spread, flat field    render      clean radiance, development
 //!                exposure        electrons, automatic time   noise       detector, numbers
+//!                ghost           reflections in the lenses
 //! rover          approach, plan  before there is a world     odometry    where it believes to stand
 //!                drive, course   where it truly stands
 //!                suspension      how its wheels stand        body        what casts its shadow
@@ -64,6 +65,7 @@ pub mod library;
 #[cfg(test)]
 mod tests;
 
+pub use camera::ghost::add_ghosts;
 pub use camera::picture::{Eye, NoiseSeed, Region};
 pub use camera::render::{clean_radiance, develop, develop_until, render};
 pub use camera::rig::Rig;

@@ -16,12 +16,14 @@ use sightline_geometry::frames::Pixel;
 use sightline_recordings::replayed::Answer;
 use sightline_recordings::{DrivenTraverse, Traverse};
 use sightline_rover::driving::{
-    ArrivalAction, Cycle, DriveCommand, GoalRule, NavigatorKind, OdometryPair, PathChoice, TrackedStops,
+    ArrivalAction, Cycle, DriveCommand, GoalRule, NavigatorKind, OdometryPair, PathChoice, SlipCheck,
+    TrackedStops,
 };
 use sightline_rover::visual_odometry::OdometryMode;
 use sightline_session::driving::{DriveSummary, TargetedDrive};
 use sightline_session::replayed_drive::{ReplaySummary, ReplayedDrive};
 use sightline_session::step::RunStep;
+use sightline_session::stop_cause::StopExplanation;
 use sightline_track::presets::preset;
 use sightline_track::settings::{Changes, Settings, parse_assignment};
 use sightline_track::target::Designation;
@@ -93,6 +95,15 @@ pub(super) struct Drive {
     /// Slip ratio of a step above which the drive stops.
     #[arg(long, value_name = "PART", default_value_t = DriveCommand::default().slip_max)]
     slip_max: f64,
+    /// The motion that the slip is a part of.
+    #[arg(long, value_name = "MOTION", default_value = "wheels")]
+    slip_check: SlipOf,
+    /// Number of consecutive motions refused by visual odometry above which the drive stops; by default it never does.
+    #[arg(long, value_name = "N")]
+    refusals_max: Option<u32>,
+    /// Time on Mars after which the drive stops, also during a motion, min.
+    #[arg(long, value_name = "MIN", default_value_t = DriveCommand::default().flight_minutes_max)]
+    minutes: f64,
     /// An action after arrival; can be given more than once.
     #[arg(long, value_name = "ACTION")]
     on_arrival: Vec<OnArrival>,
@@ -132,6 +143,15 @@ enum Odometry {
     SlipCheck,
     /// Accepted updates correct the pose as well.
     Full,
+}
+
+/// The motion that the measured one is compared with.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum SlipOf {
+    /// What the wheels have driven.
+    Wheels,
+    /// The whole command, also where the time ended the motion early.
+    Command,
 }
 
 /// The pairs in which vision measures the motion.
@@ -230,6 +250,9 @@ struct TargetLine {
 #[derive(Serialize)]
 struct SummaryLine {
     summary: DriveSummary,
+    /// Why the drive stopped; absent where it has arrived.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    why: Option<StopExplanation>,
 }
 
 impl Drive {
@@ -327,6 +350,12 @@ impl Drive {
             hazard_camera: self.hazard_camera,
             exemption_radius_m: self.exemption,
             slip_max: self.slip_max,
+            slip_check: match self.slip_check {
+                SlipOf::Wheels => SlipCheck::Wheels,
+                SlipOf::Command => SlipCheck::Command,
+            },
+            refusals_max: self.refusals_max,
+            flight_minutes_max: self.minutes,
             on_arrival: self.on_arrival.iter().map(|OnArrival::Look| ArrivalAction::Look).collect(),
             ..DriveCommand::default()
         }
@@ -352,7 +381,7 @@ fn follow(mut drive: TargetedDrive, settings: &Settings) -> Result<()> {
         line(&StopLine { row: step.into(), vetoed_paths: vetoed_paths(cycle), cycle })?;
         progress.tell(number + 1, drive.command.stops_max as usize);
         if !goes_on {
-            return line(&SummaryLine { summary: drive.summary() });
+            return line(&SummaryLine { summary: drive.summary(), why: drive.why() });
         }
         // The images of stops that were left behind are not needed any more.
         drive.steps[number] = Arc::new(without_images(&drive.steps[number]));

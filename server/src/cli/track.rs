@@ -314,7 +314,7 @@ fn write_rrd(path: &Path, traverse: &Traverse, runs: &[Vec<Arc<RunStep>>]) -> Re
         progress.tell(done, all);
         ControlFlow::Continue(())
     };
-    rerun_log::export(path, &traverse.index().name, traverse, &logs, &mut tell)
+    rerun_log::export(path, &traverse.index().name, traverse, (&logs, None), &mut tell)
 }
 
 /// Reads `azimuth,elevation` in degrees.

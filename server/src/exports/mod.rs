@@ -84,6 +84,7 @@ fn recording(
         if is_cancelled { ControlFlow::Break(()) } else { progress(k, n) }
     };
     let traverse = &source.open.traverse;
-    rerun_log::export(&path, &traverse.index().name, traverse, &runs, &mut tell)?;
+    let drive = source.drive.as_ref();
+    rerun_log::export(&path, &traverse.index().name, traverse, (&runs, drive), &mut tell)?;
     Ok(Made::File(std::fs::File::open(&path).map_err(internal)?, folder))
 }

@@ -10,9 +10,11 @@ use sightline_track::trace::StepTrace;
 use sightline_vision::image::GrayImage;
 
 use super::kind::{Kind, Part};
+use crate::driven;
 use crate::live_session::LiveSession;
 use crate::problem::{ApiError, ApiResult};
 use crate::rendering::OpenTraverse;
+use crate::rerun_log::DriveLog;
 
 /// A session as it stands; its steps are shared, so that this costs little.
 pub(crate) struct Source {
@@ -22,6 +24,8 @@ pub(crate) struct Source {
     pub notes: Notes,
     /// Its traverse.
     pub open: Arc<OpenTraverse>,
+    /// Its drive; `None` where nobody drives.
+    pub drive: Option<DriveLog>,
 }
 
 /// A run with its numbers.
@@ -41,7 +45,7 @@ impl Source {
     /// The session as it stands now.
     pub(crate) fn of(live: &LiveSession) -> Self {
         let (session, notes) = live.with(|session| (session.clone(), live.with_notes(|notes| notes.clone())));
-        Self { session, notes, open: live.traverse() }
+        Self { session, notes, open: live.traverse(), drive: driven::log(live) }
     }
 
     /// Checks that what is asked for is there.

@@ -13,6 +13,7 @@ use sightline_geometry::error::{Error, Result};
 use sightline_recordings::files::{PartialFile, remove_left_overs_of};
 use sightline_rover::pipeline::Stops;
 
+use super::drive::DriveLog;
 use super::memory::MemoryStream;
 use super::recorder::{Recorder, RunLog, builder};
 
@@ -22,7 +23,7 @@ const STEPS_AT_ONCE: usize = 16;
 /// Size at which a chunk of one entity is closed, bytes.
 const CHUNK_BYTES: u64 = 4 << 20;
 
-/// Writes `runs` with their layout to `path`, a new file.
+/// Writes `runs` and a drive with their layout to `path`, a new file.
 ///
 /// `progress` is told the steps done and the steps in all; when it breaks, nothing is left behind.
 ///
@@ -32,14 +33,14 @@ pub fn export(
     path: &Path,
     traverse_name: &str,
     stops: &dyn Stops,
-    runs: &[RunLog<'_>],
+    (runs, drive): (&[RunLog<'_>], Option<&DriveLog>),
     progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
 ) -> Result<()> {
     if path.exists() {
         return Err(failed(path, "the file exists already; choose another name"));
     }
     remove_left_overs_of(path);
-    write(PartialFile::create(path)?, path, traverse_name, stops, runs, progress)?.complete_new()
+    write(PartialFile::create(path)?, path, traverse_name, stops, (runs, drive), progress)?.complete_new()
 }
 
 fn write(
@@ -47,7 +48,7 @@ fn write(
     path: &Path,
     traverse_name: &str,
     stops: &dyn Stops,
-    runs: &[RunLog<'_>],
+    (runs, drive): (&[RunLog<'_>], Option<&DriveLog>),
     progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
 ) -> Result<PartialFile> {
     let wrong = |error: &dyn std::fmt::Display| failed(path, &error.to_string());
@@ -60,6 +61,7 @@ fn write(
     recorder
         .log_runs(runs, stops)
         .and_then(|()| recorder.log_traverse(traverse_name, stops))
+        .and_then(|()| drive.map_or(Ok(()), |drive| recorder.log_drive(drive, stops)))
         .map_err(|e| wrong(&e))?;
     let all: BTreeSet<usize> = runs.iter().flat_map(|run| run.steps).map(|trace| trace.step).collect();
     for (done, step) in all.iter().enumerate() {

@@ -14,6 +14,7 @@ use sightline_geometry::error::{Error, Result};
 use sightline_rover::pipeline::Stops;
 use sightline_session::Session;
 
+use super::drive::DriveLog;
 use super::memory::MemoryStream;
 use super::recorder::{Recorder, RunLog, builder};
 use crate::jobs::lock;
@@ -48,12 +49,18 @@ impl LiveRecording {
         Ok(Self { memory, recorder, encoder, encoded })
     }
 
-    /// Logs the next steps of the session that are not in the recording; returns their bytes, empty when the recording is
+    /// Logs the decisions of its drive and the next steps of the session that are not in the recording; returns their bytes, empty when the recording is
     /// up to date.
     ///
     /// # Errors
     /// [`Error::Request`] when rerun cannot take the rows.
-    pub fn advance(&mut self, traverse_name: &str, stops: &dyn Stops, session: &Session) -> Result<Vec<u8>> {
+    pub fn advance(
+        &mut self,
+        traverse_name: &str,
+        stops: &dyn Stops,
+        session: &Session,
+        drive: Option<&DriveLog>,
+    ) -> Result<Vec<u8>> {
         let live = session.targets.iter().enumerate().filter(|(_, target)| !target.removed);
         let runs: Vec<_> = live
             .flat_map(|(number, target)| {
@@ -71,6 +78,7 @@ impl LiveRecording {
         recorder
             .log_traverse(traverse_name, stops)
             .and_then(|()| recorder.log_runs(&runs, stops))
+            .and_then(|()| drive.map_or(Ok(()), |drive| recorder.log_drive(drive, stops)))
             .map_err(|error| refused(&error))?;
         let all = runs.iter().flat_map(|run| run.steps.iter().map(move |step| (run, step)));
         let missing: Vec<_> =

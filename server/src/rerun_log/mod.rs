@@ -127,10 +127,13 @@
 //! | `/truth/{target}/err_m` | `Scalars`, static `SeriesLines` | the truth is known |
 //! | `/truth/{target}/nees` | `Scalars`, static `SeriesLines` | the truth is known and there is a covariance |
 //!
+//! A drive on commands has `/drive/…` beside these, one row for each decision (`drive`).
+//!
 //! Beside these, `/{target}/record/{stage}/{quantity}` has every number that a stage declares, as `Scalars`.
 
 mod blueprint;
 mod border;
+mod drive;
 mod entities;
 mod export;
 mod features;
@@ -155,6 +158,7 @@ use rerun::{RecordingStream, RecordingStreamResult};
 use sightline_rover::pipeline::Stops;
 use sightline_session::step::RunStep;
 
+pub use drive::DriveLog;
 pub use entities::{EntityDoc, Rows, documented_entities, entities_of, shared_entities};
 pub use export::export;
 pub use live::LiveRecording;

@@ -17,6 +17,7 @@ use sightline_session::step::RunStep;
 use sightline_vision::image::GrayImage;
 
 use super::blueprint::Lane;
+use super::drive::DriveLog;
 use super::images::log_further;
 use super::map::Outlook;
 use super::step::Step;
@@ -57,6 +58,8 @@ pub(super) struct Recorder {
     measured: BTreeSet<usize>,
     /// The pairs whose odometry the layout shows.
     odometry: BTreeSet<Option<CameraName>>,
+    /// Stops whose decision is in the recording.
+    decided: BTreeSet<usize>,
     /// The runs by their names in paths.
     runs: BTreeMap<String, Known>,
 }
@@ -119,6 +122,7 @@ impl Recorder {
             captured: BTreeSet::new(),
             measured: BTreeSet::new(),
             odometry: BTreeSet::new(),
+            decided: BTreeSet::new(),
             runs: BTreeMap::new(),
         }
     }
@@ -142,6 +146,17 @@ impl Recorder {
             self.set_time(step, stops);
             log_stop(&self.stream, stops, step)
         })
+    }
+
+    /// Logs the decisions of a drive that are new.
+    pub(super) fn log_drive(&mut self, drive: &DriveLog, stops: &dyn Stops) -> Logged {
+        for cycle in &drive.cycles {
+            if self.decided.insert(cycle.step) {
+                self.set_time(cycle.step, stops);
+                drive.log(&self.stream, cycle, &stops.site_from_rover(cycle.step))?;
+            }
+        }
+        Ok(())
     }
 
     /// Makes runs known, so that a viewer lays them out; those already known cost nothing.

@@ -153,14 +153,22 @@ fn answer(state: &AppState, work: &Work, mut asked: RecordedStep) {
     }));
     let outcome =
         outcome.unwrap_or_else(|_| Err("the server met a fault of its own; its log says more".to_owned()));
-    work.change(|question| match outcome {
-        Ok(Some(answer)) => (question.state, question.answer) = (QuestionState::Done, Some(answer)),
-        Ok(None) => question.state = QuestionState::Cancelled,
-        Err(why) => (question.state, question.problem) = (QuestionState::Failed, Some(why)),
-    });
+    let mut ended = work.view();
+    match outcome {
+        Ok(Some(answer)) => (ended.state, ended.answer) = (QuestionState::Done, Some(answer)),
+        Ok(None) => ended.state = QuestionState::Cancelled,
+        Err(why) => (ended.state, ended.problem) = (QuestionState::Failed, Some(why)),
+    }
     // On disk before anybody sees it, unless the session is gone with its questions.
-    if !live.is_removed() {
-        state.store().keep_question(&work.view());
+    let keep = |question: &Question| {
+        if !live.is_removed() {
+            state.store().keep_question(question);
+        }
+    };
+    keep(&ended);
+    if !work.change(|question| *question = ended) {
+        // Cancelled meanwhile.
+        keep(&work.view());
     }
     state.tell(work.progress());
 }

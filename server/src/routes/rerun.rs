@@ -22,6 +22,7 @@ use tokio::sync::broadcast::error::RecvError;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
+use crate::driven;
 use crate::extract::{Path, SessionPath};
 use crate::jobs::{blocking, lock};
 use crate::live_session::LiveSession;
@@ -131,7 +132,8 @@ impl Reader {
         blocking(move || {
             let (session, open) = (live.with(|session| session.clone()), live.traverse());
             let traverse = &open.traverse;
-            Ok(lock(&recording).advance(&traverse.index().name, traverse, &session)?)
+            let drive = driven::log(&live);
+            Ok(lock(&recording).advance(&traverse.index().name, traverse, &session, drive.as_ref())?)
         })
         .await
     }

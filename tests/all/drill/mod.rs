@@ -11,7 +11,7 @@ mod trouble;
 
 use std::sync::Mutex;
 use std::sync::mpsc::RecvTimeoutError;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 use sightline_tests::server::PIXEL;
@@ -20,6 +20,9 @@ use crate::keeping::Killable;
 
 /// What a line of the table begins with.
 const MARK: &str = "drill |";
+
+/// Idle threads have ended after this.
+const IDLE: Duration = Duration::from_secs(20);
 
 /// Drills measure the same machine: one at a time.
 static ONE: Mutex<()> = Mutex::new(());
@@ -69,6 +72,11 @@ impl Held {
     }
 }
 
+/// What may be left of so many threads or descriptors.
+const fn most(before: u64) -> u64 {
+    before + before / 5 + 2
+}
+
 /// What a process holds before, at most during, and after some work.
 pub(crate) struct Watched<T> {
     value: T,
@@ -78,7 +86,7 @@ pub(crate) struct Watched<T> {
 }
 
 impl<T> Watched<T> {
-    /// Does some work; what is held afterwards is read `rest` later.
+    /// Does some work; what is held afterwards is read `rest` later, or once its threads have ended.
     fn of(server: &Killable, rest: Duration, work: impl FnOnce() -> T) -> Self {
         let process = server.id();
         let before = Held::by(process);
@@ -97,7 +105,14 @@ impl<T> Watched<T> {
             (value, watching.join().unwrap())
         });
         std::thread::sleep(rest);
-        Self { value, before, peak, after: Held::by(process) }
+        let begun = Instant::now();
+        let mut after = Held::by(process);
+        // Idle threads end after ten seconds.
+        while after.threads > most(before.threads) && begun.elapsed() < IDLE {
+            std::thread::sleep(Duration::from_millis(200));
+            after = Held::by(process);
+        }
+        Self { value, before, peak, after }
     }
 
     /// Before → peak → after.
@@ -112,7 +127,6 @@ impl<T> Watched<T> {
 
     /// Asserts that nothing of the work is left: its threads and connections are gone.
     fn assert_given_back(&self) {
-        let most = |before: u64| before + before / 5 + 2;
         assert!(self.after.threads <= most(self.before.threads), "threads: {} after", self.after.threads);
         let [before, after] = [self.before.descriptors, self.after.descriptors];
         assert!(after <= most(before), "descriptors: {before} before, {after} after");

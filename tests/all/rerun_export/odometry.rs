@@ -27,7 +27,7 @@ fn exported(traverse: &Traverse, steps: &[Arc<RunStep>]) -> Recording {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("odometry.rrd");
     let runs = [RunLog { target: 0, run: 0, label: "rock", steps }];
-    export(&path, "measured", traverse, &runs, &mut |_, _| ControlFlow::Continue(())).unwrap();
+    export(&path, "measured", traverse, (&runs, None), &mut |_, _| ControlFlow::Continue(())).unwrap();
     rrd::read(&path)
 }
 

@@ -7,6 +7,7 @@ pub(crate) mod paths;
 pub(crate) mod pause;
 pub(crate) mod stages;
 pub(crate) mod update;
+pub(crate) mod why;
 pub(crate) mod words;
 
 use sightline_rover::driving::DriveCommand;

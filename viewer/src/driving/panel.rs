@@ -2,7 +2,7 @@
 
 use egui::{Button, CollapsingHeader, ComboBox, DragValue, Grid, Label, Response, RichText, ScrollArea, Ui};
 use sightline_rover::driving::{
-    ArrivalAction, DriveCommand, GoalRule, NavigatorKind, OdometryPair, StopReason, TrackedStops,
+    ArrivalAction, DriveCommand, GoalRule, NavigatorKind, OdometryPair, SlipCheck, StopReason, TrackedStops,
 };
 use sightline_rover::visual_odometry::{OdometryMode, OdometryPreset};
 use sightline_session::driving::DriveView;
@@ -10,11 +10,14 @@ use sightline_session::pause::PauseSide;
 use sightline_track::cycle_stage::CycleStage;
 
 use crate::command::{Command, Go};
-use crate::driving::{Ask, pause, words};
+use crate::driving::{Ask, pause, why, words};
 use crate::panels::digits;
 use crate::panels::panel::Panel;
 use crate::state::{State, run_letter};
 use crate::{panels, theme};
+
+/// The first limit of refused motions in the form.
+const REFUSALS: u32 = 3;
 
 /// The panel “Drive”.
 pub(crate) struct Drive;
@@ -38,6 +41,9 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
                 pause_form(ui, state, out);
                 buttons(ui, state, drive, out);
                 standing(ui, drive);
+                if let Some(why) = &drive.why {
+                    why::show(ui, why, out);
+                }
                 decisions(ui, state, drive, out);
             }
             None if state.is_on_commands() => {
@@ -135,11 +141,34 @@ fn limits(ui: &mut Ui, command: &mut DriveCommand) {
         if percent != 100.0 * command.slip_max {
             command.slip_max = percent / 100.0;
         }
+        let of = |check| match check {
+            SlipCheck::Wheels => "slip of what the wheels drove",
+            SlipCheck::Command => "slip of the whole command",
+        };
+        let help = "The motion that the slip is a part of: they differ where the time ends a motion early";
+        let checks = [SlipCheck::Wheels, SlipCheck::Command];
+        choice(ui, "slip check", 190.0, checks, &mut command.slip_check, of).on_hover_text(help);
+        refusals(ui, command);
         number(ui, "tilt", "°", &mut command.tilt_max_deg, (1.0, 45.0), "Largest tilt after a step");
         let help = "Hazards nearer to the target than this are ignored, so that a large rock can be approached";
         number(ui, "exemption", " m", &mut command.exemption_radius_m, (0.0, 5.0), help);
         number(ui, "time", " min", &mut command.flight_minutes_max, (1.0, 10_000.0), "Time on Mars");
     });
+}
+
+/// Whether refused motions end the drive, and how many in a row.
+fn refusals(ui: &mut Ui, command: &mut DriveCommand) {
+    let mut ends = command.refusals_max.is_some();
+    ui.checkbox(&mut ends, "stop when odometry refuses").on_hover_text(
+        "The drive stops when visual odometry has refused more motions in a row than this; otherwise it goes on by wheels and gyro",
+    );
+    if ends != command.refusals_max.is_some() {
+        command.refusals_max = ends.then_some(REFUSALS);
+    }
+    if let Some(most) = &mut command.refusals_max {
+        let drag = DragValue::new(most).range(0..=1000).prefix("refusals ");
+        ui.add(drag).accessible_name("refusals").on_hover_text("Largest number of refused motions in a row");
+    }
 }
 
 fn number(ui: &mut Ui, name: &str, unit: &str, value: &mut f64, (low, high): (f64, f64), help: &str) {
@@ -291,7 +320,7 @@ fn decisions(ui: &mut Ui, state: &State, drive: &DriveView, out: &mut Vec<Comman
             ui.label(theme::number(format!("{} m", digits(cycle.goal.distance_m))));
             let motion = match (&cycle.motion, &cycle.ending) {
                 (Some(motion), _) => words::motion(motion),
-                (None, Some(ending)) => words::reason(ending.reason).to_owned(),
+                (None, Some(ending)) => ending.reason.word().to_owned(),
                 (None, None) if is_undecided(drive, cycle.step) => "not chosen yet".to_owned(),
                 (None, None) => "looks again".to_owned(),
             };

@@ -8,8 +8,8 @@ use sightline_rover::driving::Cycle;
 use sightline_session::driving::{DriveView, Steering};
 use sightline_session::pause::Halt;
 
+use crate::driving::Ask;
 use crate::driving::pause::{self, PauseForm};
-use crate::driving::{Ask, words};
 use crate::state::State;
 use crate::state::calls::Notice;
 
@@ -34,7 +34,7 @@ impl State {
     pub(crate) fn drive_word(&self) -> Option<&'static str> {
         let drive = self.drive()?;
         Some(match drive.cycles.last().and_then(|cycle| cycle.ending.as_ref()) {
-            Some(ending) => words::reason(ending.reason),
+            Some(ending) => ending.reason.word(),
             None if drive.is_driving => "drives",
             None => "waits",
         })

@@ -1,50 +1,13 @@
 //! Motions, ends and outcomes in words.
 
-use sightline_rover::driving::{
-    Cycle, Ending, Motion, NavigatorKind, OdometryPair, StopReason, TrackedStops, Veto,
-};
+use sightline_rover::driving::{Cycle, Ending, NavigatorKind, OdometryPair, StopReason, TrackedStops, Veto};
 use sightline_rover::hazards::HazardTerm;
 use sightline_rover::visual_odometry::{MeasuredMotion, OdometryMode, OdometryPreset};
 use sightline_session::driving::DriveSummary;
+pub(super) use sightline_session::stop_cause::words::motion;
 
 use crate::panels::digits;
 use crate::panels::numbers::{counted, fixed};
-
-/// A motion as a person would tell it.
-pub(super) fn motion(motion: &Motion) -> String {
-    let side = |value: f64| if value > 0.0 { "right" } else { "left" };
-    match *motion {
-        Motion::Turn { angle_rad } => {
-            format!("turn {}° {}", digits(angle_rad.abs().to_degrees()), side(angle_rad))
-        }
-        Motion::Arc { length_m, curvature_per_m } => {
-            let way = if length_m < 0.0 { "back" } else { "ahead" };
-            let length = format!("{} m {way}", digits(length_m.abs()));
-            // Straighter than that nobody can tell.
-            if curvature_per_m.abs() < 1e-3 {
-                return length;
-            }
-            format!("{length}, radius {} m {}", digits(1.0 / curvature_per_m.abs()), side(curvature_per_m))
-        }
-    }
-}
-
-/// Why a drive ended.
-pub(super) fn reason(reason: StopReason) -> &'static str {
-    match reason {
-        StopReason::Arrived => "arrived",
-        StopReason::Lost => "target lost",
-        StopReason::Stalled => "a wheel stalled at a rock",
-        StopReason::Slip => "slipped too much",
-        StopReason::Tilt => "tilted too much",
-        StopReason::Time => "time on Mars used up",
-        StopReason::StopLimit => "all stops used up",
-        StopReason::LimitCycle => "limit cycle",
-        StopReason::NoSafePath => "no safe path",
-        StopReason::GoalBlocked => "goal on bad ground",
-        StopReason::NoRangeData => "no range data",
-    }
-}
 
 /// What chooses the motions.
 pub(super) fn navigator(navigator: NavigatorKind) -> &'static str {
@@ -132,6 +95,7 @@ pub(super) fn ending(ending: &Ending) -> String {
         StopReason::Tilt => "°",
         StopReason::Time => " min",
         StopReason::StopLimit => " stops",
+        StopReason::OdometryRefused => " updates in a row",
         StopReason::NoRangeData => " points",
         StopReason::Arrived
         | StopReason::Lost
@@ -142,13 +106,13 @@ pub(super) fn ending(ending: &Ending) -> String {
         | StopReason::GoalBlocked => "",
     };
     if let Some(detail) = &ending.detail {
-        return format!("{}: {detail}", reason(ending.reason));
+        return format!("{}: {detail}", ending.reason.word());
     }
     match (ending.value, ending.limit) {
         (Some(value), Some(limit)) => {
-            format!("{}: {}{unit}, limit {}", reason(ending.reason), digits(value), digits(limit))
+            format!("{}: {}{unit}, limit {}", ending.reason.word(), digits(value), digits(limit))
         }
-        _ => reason(ending.reason).to_owned(),
+        _ => ending.reason.word().to_owned(),
     }
 }
 
@@ -194,11 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn motions_and_ends_are_told_in_words() {
-        let arc = |length_m, curvature_per_m| motion(&Motion::Arc { length_m, curvature_per_m });
-        assert_eq!(arc(0.83, 0.05), "0.830 m ahead, radius 20 m right");
-        assert_eq!(arc(-0.2, 0.0), "0.200 m back");
-        assert_eq!(motion(&Motion::Turn { angle_rad: -0.5 }), "turn 28.65° left");
+    fn ends_are_told_in_words() {
         let named = |reason, value, detail| Ending { reason, value, limit: value, detail };
         let arrived = Ending { limit: Some(0.01), ..named(StopReason::Arrived, Some(0.008), None) };
         assert_eq!(ending(&arrived), "arrived: 0.8 cm from the goal by its own estimate, tolerance 1.0 cm");

@@ -35,6 +35,17 @@ pub enum TrackedStops {
     ByDistance,
 }
 
+/// The motion that the measured one is compared with for the slip that may end a drive.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SlipCheck {
+    /// What the wheels have driven.
+    #[default]
+    Wheels,
+    /// The whole commanded motion, also where the rover ended it early because its time was used up.
+    Command,
+}
+
 /// The navigator that chooses the motions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
@@ -119,9 +130,14 @@ pub struct DriveCommand {
     /// The drive stops when the slip of a step is measured as larger, as a part of the wheels' motion (0.9; 0.05 to 2). Without
     /// odometry it has no effect.
     pub slip_max: f64,
+    /// The motion that the slip is a part of (`wheels`).
+    pub slip_check: SlipCheck,
+    /// The drive stops when visual odometry has refused more motions in a row than this (null: it never does; 0 to 1000). Without
+    /// odometry it has no effect.
+    pub refusals_max: Option<u32>,
     /// The drive stops when the rover tilts by more than this, deg (30: domain.md 5.4; 1 to 45).
     pub tilt_max_deg: f64,
-    /// The drive stops after this much time on Mars, min (480; 1 to 10,000).
+    /// The drive stops after this much time on Mars, min (480; 1 to 10,000). A motion during which it is used up is ended early.
     pub flight_minutes_max: f64,
     /// Actions after arrival, in this order (none; 10 at most). Each is one more stop, at which the rover stays.
     pub on_arrival: Vec<ArrivalAction>,
@@ -144,6 +160,8 @@ impl Default for DriveCommand {
             hazard_camera: None,
             exemption_radius_m: 0.0,
             slip_max: 0.9,
+            slip_check: SlipCheck::Wheels,
+            refusals_max: None,
             tilt_max_deg: 30.0,
             flight_minutes_max: 480.0,
             on_arrival: Vec::new(),
@@ -171,6 +189,7 @@ impl DriveCommand {
         within("stops_max", f64::from(self.stops_max), 2.0, 1000.0)?;
         within("exemption_radius_m", self.exemption_radius_m, 0.0, 5.0)?;
         within("slip_max", self.slip_max, 0.05, 2.0)?;
+        within("refusals_max", f64::from(self.refusals_max.unwrap_or(0)), 0.0, 1000.0)?;
         within("tilt_max_deg", self.tilt_max_deg, 1.0, 45.0)?;
         within("flight_minutes_max", self.flight_minutes_max, 1.0, 10_000.0)?;
         let looks = self.on_arrival.len();

@@ -13,79 +13,22 @@ use sightline_geometry::odometry_error::PoseChangeError;
 use sightline_track::settings::Settings;
 use sightline_track::stages::predict;
 use sightline_track::stages::update::Updated;
-use sightline_track::target::TrackingState;
 use sightline_track::trace::StepTrace;
 
 use super::active_world::{ActiveWorld, DriveReport, FollowedCycle};
 use super::command::{ArrivalAction, DriveCommand, GoalRule};
 use super::dead_reckoning::Reckoned;
-use super::flight_time::FlightTime;
-use super::limit_cycle;
+use super::ending::{Ending, ending};
+use super::flight_time::{FlightTime, drive_s};
 use super::map_hazards::StopHazards;
 use super::motion::Motion;
-use super::next_motion::{self, slip_to};
+use super::next_motion;
 use super::odometry::{self, OdometryPair};
 use super::path_choice::PathChoice;
 use super::select_path::Navigator;
 use super::set_goal::{Goal, set_goal};
 use crate::pipeline::{self, StepChanges, Stops};
 use crate::visual_odometry::pose_change_error;
-
-/// Why a drive stopped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum StopReason {
-    /// The rover is within the tolerance of the goal.
-    Arrived,
-    /// The tracker gave the target up.
-    Lost,
-    /// A wheel met a step too high to climb.
-    Stalled,
-    /// The wheels slipped more than allowed.
-    Slip,
-    /// The rover tilts more than allowed.
-    Tilt,
-    /// The time on Mars is used up.
-    Time,
-    /// The number of stops is used up.
-    StopLimit,
-    /// The rover has come back to one place again and again.
-    LimitCycle,
-    /// Every path is vetoed by the hazard map.
-    NoSafePath,
-    /// The rover cannot reach its goal, and is about as near to it as it can be.
-    GoalBlocked,
-    /// The pair of the hazard map is missing, or gives too few points.
-    NoRangeData,
-}
-
-/// The end of a drive.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
-pub struct Ending {
-    /// Why it stopped.
-    pub reason: StopReason,
-    /// The value that decided, in the unit of its limit: m, a part, deg, min, a count; null for `lost`, `stalled`, `limit_cycle`
-    /// and `no_safe_path`, and for a missing pair; of `goal_blocked` that of the ground at the goal.
-    pub value: Option<f64>,
-    /// The limit that it met; null where `value` is.
-    pub limit: Option<f64>,
-    /// The reason in more detail: the smallest change of a limit that opens a path, what is wrong with the goal, why there are no range
-    /// data, or which stops are at one place; null for the other reasons.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub detail: Option<String>,
-}
-
-impl Ending {
-    /// An end for a value beyond its limit.
-    pub(super) fn beyond(reason: StopReason, value: f64, limit: f64) -> Self {
-        Self { reason, value: Some(value), limit: Some(limit), detail: None }
-    }
-
-    /// An end without a value.
-    pub(super) fn named(reason: StopReason, detail: Option<String>) -> Self {
-        Self { reason, value: None, limit: None, detail }
-    }
-}
 
 /// The decision at a stop, made once the target is located there.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -100,6 +43,9 @@ pub struct Cycle {
     pub by_wheels: Reckoned,
     /// The chosen motion; null where the drive ended or the rover stays.
     pub motion: Option<Motion>,
+    /// Part of the motion after which the time of the command was used up and the rover stopped, 0 to 1; null where it was not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_up_after: Option<f64>,
     /// Whether odometry runs alone at the stop that the motion leads to: it is a part of a step.
     #[serde(default)]
     pub odometry_alone: bool,
@@ -192,7 +138,10 @@ pub fn drive(world: &mut dyn ActiveWorld, input: &CycleInput<'_>, cancel: Cancel
     match cycle.motion {
         Some(motion) => {
             odometry::before_drive(world, input.command)?;
-            cycle.add(world.drive(&motion, cancel)?);
+            let left_s = 60.0 * (input.command.flight_minutes_max - cycle.flight_minutes);
+            cycle.time_up_after = Some(left_s / drive_s(&motion)).filter(|part| *part < 1.0);
+            let driven = motion.part(cycle.time_up_after.unwrap_or(1.0));
+            cycle.add(world.drive(&driven, cancel)?);
             if cycle.odometry_alone {
                 world.leave_to_odometry()?;
             }
@@ -229,6 +178,7 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
         estimated,
         by_wheels,
         motion: None,
+        time_up_after: None,
         odometry_alone: false,
         range_points: input.hazards.and_then(StopHazards::point_count),
         choice: None,
@@ -261,7 +211,7 @@ fn reckoned(stops: &dyn Stops, input: &CycleInput<'_>, pose: &Pose) -> [Reckoned
         // The rover stayed.
         return [before.estimated, before.by_wheels];
     };
-    let part = report.stall.map_or(1.0, |stall| stall.completed);
+    let part = before.time_up_after.unwrap_or(1.0) * report.stall.map_or(1.0, |stall| stall.completed);
     let change_error = pose_change_error(stops, input.last.step);
     [before.estimated.at(pose, &change_error), before.by_wheels.rolled(motion, part, &stops.odometry_error())]
 }
@@ -298,42 +248,4 @@ pub fn point_mast(world: &mut dyn ActiveWorld, last: &Updated) -> Result<()> {
     let (left, _) = world.stops().cameras(last.target.step + 1);
     let around = left.project(&predicted.position_in_rover);
     world.expose(around)
-}
-
-/// Why the drive ends at this stop, if it does.
-fn ending(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &Cycle) -> Option<Ending> {
-    let command = input.command;
-    let end = |reason, value: f64, limit: f64| Some(Ending::beyond(reason, value, limit));
-    let named = |reason| Some(Ending::named(reason, None));
-    // A later look may put the goal a little elsewhere; the rover has arrived all the same.
-    if (cycle.goal.arrived && !input.last.is_odometry_alone()) || cycle.arrival_actions > 0 {
-        return end(StopReason::Arrived, cycle.goal.distance_m, command.tolerance_m);
-    }
-    // The baseline drives on whatever tracking makes of it.
-    if command.goal == GoalRule::FollowsTarget && input.last.update.state == TrackingState::Failed {
-        return named(StopReason::Lost);
-    }
-    if let Some(report) = input.before.and_then(|before| before.report) {
-        if report.stall.is_some() {
-            return named(StopReason::Stalled);
-        }
-        if let Some(slip) = slip_to(stops, cycle.step).filter(|slip| *slip > command.slip_max) {
-            return end(StopReason::Slip, slip, command.slip_max);
-        }
-        if report.tilt_deg > command.tilt_max_deg {
-            return end(StopReason::Tilt, report.tilt_deg, command.tilt_max_deg);
-        }
-    }
-    if cycle.flight_minutes > command.flight_minutes_max {
-        return end(StopReason::Time, cycle.flight_minutes, command.flight_minutes_max);
-    }
-    let count = cycle.step + 1 - input.first.step;
-    if count >= command.stops_max as usize {
-        return end(StopReason::StopLimit, count as f64, f64::from(command.stops_max));
-    }
-    let poses: Vec<Pose> = (input.first.step..=cycle.step).map(|step| stops.site_from_rover(step)).collect();
-    let visits: Vec<usize> =
-        limit_cycle::visits(&poses).into_iter().map(|index| input.first.step + index).collect();
-    (visits.len() >= limit_cycle::VISITS_MAX)
-        .then(|| Ending::named(StopReason::LimitCycle, Some(limit_cycle::sentence(&visits))))
 }

@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use sightline_track::cycle_stage::CycleStage;
 use utoipa::ToSchema;
 
+use super::motion::Motion;
 use super::odometry::OdometryPair;
 use crate::visual_odometry::MeasuredMotion;
 
@@ -27,6 +28,10 @@ const CAPTURE_MIN_S: f64 = 5.0;
 const POINT_MAST_S: f64 = 5.0;
 /// One update of visual odometry, s.
 const ODOMETRY_S: f64 = 90.0;
+/// Speed of the rover, m/s (domain.md 5.4).
+pub const SPEED_M_S: f64 = 0.0375;
+/// Rate of a turn in place, rad/s (domain.md 5.4).
+pub const TURN_RAD_S: f64 = 2.1 * std::f64::consts::PI / 180.0;
 
 /// Time of one stop on Mars by stage, s.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -56,6 +61,16 @@ fn is_zero(value_s: &f64) -> bool {
 fn capture_s(image_sizes: [[u32; 2]; 2]) -> f64 {
     let pixels: f64 = image_sizes.iter().map(|[width, height]| f64::from(*width) * f64::from(*height)).sum();
     (CAPTURE_S * pixels / CAPTURE_PX).max(CAPTURE_MIN_S)
+}
+
+/// Duration of a motion, s.
+pub(super) fn drive_s(motion: &Motion) -> f64 {
+    match *motion {
+        Motion::Arc { length_m, curvature_per_m } => {
+            (length_m.abs() / SPEED_M_S).max((length_m * curvature_per_m).abs() / TURN_RAD_S)
+        }
+        Motion::Turn { angle_rad } => angle_rad.abs() / TURN_RAD_S,
+    }
 }
 
 impl FlightTime {

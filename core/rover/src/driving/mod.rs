@@ -8,6 +8,7 @@
 pub mod active_world;
 pub mod command;
 pub mod dead_reckoning;
+pub mod ending;
 pub mod executive;
 pub mod flight_time;
 mod limit_cycle;
@@ -20,9 +21,10 @@ pub mod select_path;
 pub mod set_goal;
 
 pub use active_world::{ActiveWorld, DriveReport, FollowedCycle, Stall};
-pub use command::{ArrivalAction, DriveCommand, GoalRule, NavigatorKind, TrackedStops};
+pub use command::{ArrivalAction, DriveCommand, GoalRule, NavigatorKind, SlipCheck, TrackedStops};
 pub use dead_reckoning::Reckoned;
-pub use executive::{Cycle, Ending, StopReason};
+pub use ending::{Ending, StopReason};
+pub use executive::Cycle;
 pub use flight_time::FlightTime;
 pub use map_hazards::{HazardMaps, RangeData, StopHazards};
 pub use motion::Motion;

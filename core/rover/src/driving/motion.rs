@@ -41,6 +41,16 @@ impl Motion {
         }
     }
 
+    /// The first part of the motion, 0 to 1.
+    pub(super) fn part(&self, part: f64) -> Self {
+        match *self {
+            Self::Arc { length_m, curvature_per_m } => {
+                Self::Arc { length_m: part * length_m, curvature_per_m }
+            }
+            Self::Turn { angle_rad } => Self::Turn { angle_rad: part * angle_rad },
+        }
+    }
+
     /// Where the rover is after a part of the motion, 0 to 1, on level ground without slip: ahead and to the right of its
     /// start, m, and turned to the right, rad.
     pub fn after(&self, part: f64) -> ([f64; 2], f64) {

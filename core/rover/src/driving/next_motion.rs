@@ -3,7 +3,8 @@
 //! With a navigator on a hazard map the drive ends here without range data and where every path is vetoed; the rover then stays.
 
 use super::command::{DriveCommand, TrackedStops};
-use super::executive::{Cycle, CycleInput, Ending, StopReason};
+use super::ending::{Ending, StopReason};
+use super::executive::{Cycle, CycleInput};
 use super::map_hazards::RangeData;
 use super::motion::Motion;
 use super::select_path::PathInput;

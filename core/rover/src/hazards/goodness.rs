@@ -69,6 +69,8 @@ pub struct GoodnessCell {
     pub certainty: f32,
     /// Mean distance driven since the observations, m.
     pub age_m: f32,
+    /// Mean height of the cell's own points, z of the site frame, m; `None` with too few.
+    pub height_m: Option<f32>,
     /// 0 (bad) to 1; 0 if unknown.
     pub goodness: f32,
     /// Where the goodness comes from.
@@ -131,7 +133,7 @@ impl Circle {
 
 impl HazardTerm {
     /// Its word in a sentence.
-    pub(crate) const fn word(self) -> &'static str {
+    pub const fn word(self) -> &'static str {
         match self {
             Self::Tilt => "tilt",
             Self::Roughness => "roughness",
@@ -141,7 +143,7 @@ impl HazardTerm {
     }
 
     /// A value of it with its unit.
-    pub(crate) fn text(self, value: f64) -> String {
+    pub fn text(self, value: f64) -> String {
         match self {
             Self::Tilt => format!("{value:.1}°"),
             Self::Roughness | Self::Step => format!("{value:.3} m"),
@@ -190,7 +192,13 @@ impl GoodnessCell {
         (goodness < 1.0).then(|| (term, self.value(term)))
     }
 
-    fn new(sums: &DiscSums, step_m: f32, disc: &Disc, driven_m: f64, settings: &HazardSettings) -> Self {
+    fn new(
+        sums: &DiscSums,
+        (step_m, height_m): (f32, Option<f32>),
+        disc: &Disc,
+        driven_m: f64,
+        settings: &HazardSettings,
+    ) -> Self {
         let count = sums.moments.count();
         // Sums of cells without points are not exactly 0.
         if count < settings.weight_min {
@@ -199,7 +207,8 @@ impl GoodnessCell {
         let known = sums.known / disc.count() as f64;
         let certainty = (count / settings.points_full).min(1.0) * known;
         let age_m = driven_m - sums.moments.odometer_m() / count;
-        let cell = Self { step_m, certainty: certainty as f32, age_m: age_m as f32, ..Self::default() };
+        let cell =
+            Self { step_m, certainty: certainty as f32, age_m: age_m as f32, height_m, ..Self::default() };
         let Some(plane) = sums.moments.plane() else { return cell };
         let mut cell = Self {
             tilt_deg: plane.tilt_rad.to_degrees() as f32,
@@ -239,7 +248,10 @@ pub fn assess(map: &HazardMap, rules: &MapRules, settings: &HazardSettings) -> G
         .zip(&steps)
         .enumerate()
         .map(|(index, (sums, step_m))| {
-            let cell = GoodnessCell::new(sums, *step_m, &disc, map.driven_m, settings);
+            let own = map.cell(index / map.grid.side, index % map.grid.side);
+            let height_m =
+                (own.count() >= settings.weight_min).then(|| (map.height_m + own.mean_height_m()) as f32);
+            let cell = GoodnessCell::new(sums, (*step_m, height_m), &disc, map.driven_m, settings);
             cell.with_rules(map.grid.centre_m(index), rules)
         })
         .collect();

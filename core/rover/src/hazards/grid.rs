@@ -46,7 +46,7 @@ impl Grid {
     }
 
     /// Centre of a cell, site frame, m.
-    pub(crate) fn centre_m(&self, index: usize) -> [f64; 2] {
+    pub fn centre_m(&self, index: usize) -> [f64; 2] {
         let cell = [index / self.side, index % self.side];
         [0, 1].map(|axis| ((self.first[axis] + cell[axis] as i64) as f64 + 0.5) * self.cell_m)
     }

@@ -60,7 +60,7 @@ impl RangeNoise {
 pub struct HazardMap {
     pub(super) grid: Grid,
     /// Height of the reference of the sums, z of the site frame, m.
-    height_m: f64,
+    pub(super) height_m: f64,
     /// Distance driven, m.
     pub(super) driven_m: f64,
     /// By slot.

@@ -21,6 +21,7 @@ const OUTSIDE: GoodnessCell = GoodnessCell {
     step_m: 0.0,
     certainty: 0.0,
     age_m: 0.0,
+    height_m: None,
     goodness: 0.0,
     basis: CellBasis::Unknown,
 };

@@ -7,4 +7,5 @@ mod shading;
 pub(crate) mod optics;
 pub mod render;
 pub mod exposure;
+pub(crate) mod ghost;
 pub(crate) mod noise;

@@ -28,6 +28,7 @@
 
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Vector3;
+use sightline_rover::driving::flight_time::{SPEED_M_S, TURN_RAD_S};
 
 use crate::rover::approach::distances_m;
 use crate::rover::scene::{Leg, Place, Scene, TrueDrive, TrueStop, pieces, wrapped};
@@ -35,10 +36,6 @@ use crate::rover::slip::{self, Slip};
 use crate::rover::suspension::Stand;
 use crate::scenario::{Course, Move};
 
-/// Speed of the drive, m/s (domain.md 5.4).
-pub(super) const SPEED_M_S: f64 = 0.0375;
-/// Speed of a turn in place, rad/s (2.1°/s: domain.md 5.4).
-pub(super) const TURN_RAD_S: f64 = 2.1 * std::f64::consts::PI / 180.0;
 /// Nearest and farthest that a stop may be from the targets' centre, m (ours: nearer, the mast looks down on it).
 const STOP_DISTANCES_M: [f64; 2] = [1.6, 60.0];
 

@@ -21,12 +21,12 @@ use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::{POSITION_LIMIT_M, Pixel, Pose, PoseRecord, Vector3};
 
+use sightline_rover::driving::flight_time::{SPEED_M_S, TURN_RAD_S};
 use sightline_rover::visual_odometry::MeasuredMotion;
 use sightline_track::cycle_stage::CycleStage;
 
 use crate::ground::texture::mix;
 use crate::index::{PAUSE_S, Rigs, odometry_pair, simulated_stop};
-use crate::rover::course::{SPEED_M_S, TURN_RAD_S};
 use crate::rover::drive::{first_stop, in_scene};
 use crate::rover::mast_error;
 use crate::rover::odometry::Belief;

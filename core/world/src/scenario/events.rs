@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::range::within;
+use sightline_geometry::camera::CameraName;
 use sightline_geometry::error::{Error, Result};
 
 /// What changes from stop to stop. By default nothing does.
@@ -22,6 +23,9 @@ pub struct EventSettings {
     /// Things that stand between the cameras and the targets' centre (Kim09 §4.6, Kim09 §5.5, Deans05 §3).
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub occluders: Vec<Occluder>,
+    /// Reflections in the lenses of further pairs, in which stereo sees a surface that does not exist.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub ghosts: Vec<Ghost>,
 }
 
 /// A cloud before the sun, from one stop to another.
@@ -60,6 +64,32 @@ pub struct Occluder {
     pub aside_m: f64,
 }
 
+/// A reflection in the lenses of a further pair, from one stop to another. Both images show it as they
+/// would show an upright blotched patch across the rover's path; it moves with the rover.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Ghost {
+    /// The pair, by its name in camera.further.
+    pub camera: CameraName,
+    /// The first stop at which it is seen.
+    pub from_stop: u32,
+    /// The last stop at which it is seen.
+    pub to_stop: u32,
+    /// Its apparent middle: ahead of the rover's origin, to the right of it and below it, m.
+    pub at_m: [f64; 3],
+    /// Its apparent width, m.
+    pub width_m: f64,
+    /// Its apparent height, m.
+    pub height_m: f64,
+    /// What its brightest blotches add to the mean radiance of the image, as a part of it (1).
+    #[serde(default = "bright")]
+    pub brightness: f64,
+}
+
+fn bright() -> f64 {
+    1.0
+}
+
 impl EventSettings {
     pub(crate) fn validate(&self) -> Result<()> {
         within("events.sun_azimuth_deg_per_h", self.sun_azimuth_deg_per_h, -360.0, 360.0)?;
@@ -76,6 +106,16 @@ impl EventSettings {
             within(&key("width_m"), occluder.width_m, 0.01, 10.0)?;
             within(&key("height_m"), occluder.height_m, 0.01, 10.0)?;
             within(&key("aside_m"), occluder.aside_m, -10.0, 10.0)?;
+        }
+        for (index, ghost) in self.ghosts.iter().enumerate() {
+            let key = |field: &str| format!("events.ghosts[{index}].{field}");
+            in_order(&key("to_stop"), ghost.from_stop, ghost.to_stop)?;
+            within(&key("at_m[0]"), ghost.at_m[0], 0.3, 20.0)?;
+            within(&key("at_m[1]"), ghost.at_m[1], -10.0, 10.0)?;
+            within(&key("at_m[2]"), ghost.at_m[2], -10.0, 10.0)?;
+            within(&key("width_m"), ghost.width_m, 0.05, 10.0)?;
+            within(&key("height_m"), ghost.height_m, 0.05, 10.0)?;
+            within(&key("brightness"), ghost.brightness, 0.0, 10.0)?;
         }
         Ok(())
     }

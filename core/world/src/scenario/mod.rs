@@ -30,7 +30,7 @@ pub use camera::{
     AutoExposureSettings, CameraRig, CameraSettings, ExposureMode, FULL_SCALE_DN, FurtherRig, Quantisation,
 };
 pub use drive::{Course, DriveSettings, Move};
-pub use events::{Cloud, EventSettings, Occluder};
+pub use events::{Cloud, EventSettings, Ghost, Occluder};
 pub use fiducials::Fiducial;
 pub use ground::{ClearPath, PlacedRock, RockSettings, RockShape, TerrainSettings, TextureSettings};
 pub use light::{Reflectance, SunSettings};

@@ -44,6 +44,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     // Another run or target is shown from its headline on.
     let of = state.step_key(step).map(|key| (key.session, key.target, key.run));
     ScrollArea::vertical().id_salt(("why", of)).auto_shrink(false).show(ui, |ui| {
+        crate::driving::why::show_here(ui, state, out);
         let top = ui.cursor().top();
         card(ui, state, &book.summary());
         view::bring(ui, state.why.in_view, Part::Card, top, true);

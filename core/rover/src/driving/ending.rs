@@ -1,0 +1,168 @@
+//! Why a drive ends: the checks of a stop, in their order.
+//!
+//! | order | reason | check |
+//! |---|---|---|
+//! | 1 | `arrived` | distance to the goal within the tolerance, or an action after arrival was begun |
+//! | 2 | `lost` | the tracker gave the target up, and the goal follows it |
+//! | 3 | `stalled` | a wheel stalled on the way to this stop |
+//! | 4 | `slip` | measured slip of the motion to this stop against `slip_max`, of what `slip_check` names |
+//! | 5 | `odometry_refused` | consecutive refused updates of visual odometry against `refusals_max` |
+//! | 6 | `tilt` | tilt against `tilt_max_deg` |
+//! | 7 | `time` | time on Mars against `flight_minutes_max` |
+//! | 8 | `stop_limit` | number of stops against `stops_max` |
+//! | 9 | `limit_cycle` | visits to this place (`limit_cycle.rs`) |
+//!
+//! The remaining reasons follow from the selection of the path (`next_motion.rs`).
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use sightline_geometry::frames::Pose;
+use sightline_track::target::TrackingState;
+
+use super::command::{GoalRule, SlipCheck};
+use super::executive::{Cycle, CycleInput};
+use super::limit_cycle;
+use super::next_motion::slip_to;
+use crate::pipeline::Stops;
+
+/// Why a drive stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum StopReason {
+    /// The rover is within the tolerance of the goal.
+    Arrived,
+    /// The tracker gave the target up.
+    Lost,
+    /// A wheel met a step too high to climb.
+    Stalled,
+    /// The wheels slipped more than allowed.
+    Slip,
+    /// Visual odometry refused its motion too often in a row.
+    OdometryRefused,
+    /// The rover tilts more than allowed.
+    Tilt,
+    /// The time on Mars is used up.
+    Time,
+    /// The number of stops is used up.
+    StopLimit,
+    /// The rover has come back to one place again and again.
+    LimitCycle,
+    /// Every path is vetoed by the hazard map.
+    NoSafePath,
+    /// The rover cannot reach its goal, and is about as near to it as it can be.
+    GoalBlocked,
+    /// The pair of the hazard map is missing, or gives too few points.
+    NoRangeData,
+}
+
+impl StopReason {
+    /// The reason in words.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Arrived => "arrived",
+            Self::Lost => "target lost",
+            Self::Stalled => "a wheel stalled at a rock",
+            Self::Slip => "slipped too much",
+            Self::OdometryRefused => "visual odometry refused too often",
+            Self::Tilt => "tilted too much",
+            Self::Time => "time on Mars used up",
+            Self::StopLimit => "all stops used up",
+            Self::LimitCycle => "limit cycle",
+            Self::NoSafePath => "no safe path",
+            Self::GoalBlocked => "goal on bad ground",
+            Self::NoRangeData => "no range data",
+        }
+    }
+}
+
+/// The end of a drive.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Ending {
+    /// Why it stopped.
+    pub reason: StopReason,
+    /// The value that decided, in the unit of its limit: m, a part, deg, min, a count; null for `lost`, `stalled`, `limit_cycle`
+    /// and `no_safe_path`, and for a missing pair; of `goal_blocked` that of the ground at the goal.
+    pub value: Option<f64>,
+    /// The limit that it met; null where `value` is.
+    pub limit: Option<f64>,
+    /// The reason in more detail: the smallest change of a limit that opens a path, what is wrong with the goal, why there are no range
+    /// data, or which stops are at one place; null for the other reasons.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub detail: Option<String>,
+}
+
+impl Ending {
+    /// An end for a value beyond its limit.
+    pub(super) fn beyond(reason: StopReason, value: f64, limit: f64) -> Self {
+        Self { reason, value: Some(value), limit: Some(limit), detail: None }
+    }
+
+    /// An end without a value.
+    pub(super) fn named(reason: StopReason, detail: Option<String>) -> Self {
+        Self { reason, value: None, limit: None, detail }
+    }
+}
+
+/// Why the drive ends at this stop, if it does.
+pub(super) fn ending(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &Cycle) -> Option<Ending> {
+    let command = input.command;
+    let end = |reason, value: f64, limit: f64| Some(Ending::beyond(reason, value, limit));
+    let named = |reason| Some(Ending::named(reason, None));
+    // A later look may put the goal a little elsewhere; the rover has arrived all the same.
+    if (cycle.goal.arrived && !input.last.is_odometry_alone()) || cycle.arrival_actions > 0 {
+        return end(StopReason::Arrived, cycle.goal.distance_m, command.tolerance_m);
+    }
+    // The baseline drives on whatever tracking makes of it.
+    if command.goal == GoalRule::FollowsTarget && input.last.update.state == TrackingState::Failed {
+        return named(StopReason::Lost);
+    }
+    if let Some(report) = input.before.and_then(|before| before.report) {
+        if report.stall.is_some() {
+            return named(StopReason::Stalled);
+        }
+        let slip = input.before.and_then(|before| checked_slip(stops, before, command.slip_check));
+        if let Some(slip) = slip.filter(|slip| *slip > command.slip_max) {
+            return end(StopReason::Slip, slip, command.slip_max);
+        }
+        let refusals = refusals(stops, [input.first.step, cycle.step]);
+        if let Some(most) = command.refusals_max.filter(|most| refusals > *most as usize) {
+            return end(StopReason::OdometryRefused, refusals as f64, f64::from(most));
+        }
+        if report.tilt_deg > command.tilt_max_deg {
+            return end(StopReason::Tilt, report.tilt_deg, command.tilt_max_deg);
+        }
+    }
+    if cycle.flight_minutes > command.flight_minutes_max {
+        return end(StopReason::Time, cycle.flight_minutes, command.flight_minutes_max);
+    }
+    let count = cycle.step + 1 - input.first.step;
+    if count >= command.stops_max as usize {
+        return end(StopReason::StopLimit, count as f64, f64::from(command.stops_max));
+    }
+    let visits = visits(stops, [input.first.step, cycle.step]);
+    (visits.len() >= limit_cycle::VISITS_MAX)
+        .then(|| Ending::named(StopReason::LimitCycle, Some(limit_cycle::sentence(&visits))))
+}
+
+/// The first stop of each visit to the place of the last of the stops `first` to `last`, which is one of them.
+pub fn visits(stops: &dyn Stops, [first, last]: [usize; 2]) -> Vec<usize> {
+    let poses: Vec<Pose> = (first..=last).map(|step| stops.site_from_rover(step)).collect();
+    limit_cycle::visits(&poses).into_iter().map(|index| first + index).collect()
+}
+
+/// Number of consecutive motions up to the stop `last` that visual odometry refused, those to `first` not included.
+pub fn refusals(stops: &dyn Stops, [first, last]: [usize; 2]) -> usize {
+    let measured = (first + 1..=last).rev().filter_map(|step| stops.measured_motion(step));
+    measured.take_while(|measured| !measured.update.accepted).count()
+}
+
+/// The slip that the check compares, of the motion after a decision.
+fn checked_slip(stops: &dyn Stops, before: &Cycle, check: SlipCheck) -> Option<f64> {
+    let slip = slip_to(stops, before.step + 1)?;
+    Some(match check {
+        SlipCheck::Wheels => slip,
+        // What the wheels did not drive counts as slip.
+        SlipCheck::Command => 1.0 - (1.0 - slip) * before.time_up_after.unwrap_or(1.0),
+    })
+}

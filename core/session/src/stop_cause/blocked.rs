@@ -1,0 +1,167 @@
+//! Causes on the hazard map: ground beyond a limit under every path, and obstacles that move with the rover.
+
+use std::collections::BTreeMap;
+
+use sightline_geometry::frames::Point3;
+use sightline_rover::driving::{Motion, PathChoice, StopHazards, StopReason, Veto};
+use sightline_rover::hazards::{GoodnessCell, HazardTerm};
+
+use super::words::{listed, metres};
+use super::{Found, StopCause, StoppedDrive};
+
+/// Ground that is so much higher than it was measured at the stop before is other ground, m.
+const RISEN_M: f32 = 0.1;
+/// So many cells must have risen at a stop: at the foot of a rock that is seen better from near, up to nine do.
+const RISEN_CELLS: usize = 10;
+/// At three of the last five stops.
+const LAST_STOPS: usize = 5;
+const RISEN_STOPS: usize = 3;
+
+impl StoppedDrive<'_> {
+    /// The decision at the last stop, on its map.
+    fn choice(&self) -> Option<&PathChoice> {
+        self.cycles.last()?.choice.as_ref()
+    }
+
+    /// Ground that rises before the rover from stop to stop.
+    pub(super) fn false_obstacle(&self) -> Option<Found> {
+        let stays = matches!(
+            self.reason()?,
+            StopReason::NoSafePath
+                | StopReason::GoalBlocked
+                | StopReason::LimitCycle
+                | StopReason::StopLimit
+                | StopReason::Time
+        );
+        if !stays {
+            return None;
+        }
+        let pairs = self.hazards.windows(2);
+        let risen: Vec<(usize, Vec<[f64; 2]>)> = pairs
+            .map(|pair| (pair[1].step, risen_between(&pair[0], &pair[1])))
+            .filter(|(_, cells)| cells.len() >= RISEN_CELLS)
+            .collect();
+        let last = self.steps.last()?.step;
+        let lately = risen.iter().filter(|(step, _)| step + LAST_STOPS > last).count();
+        if lately < RISEN_STOPS {
+            return None;
+        }
+        let (from, _) = risen.first()?;
+        let (at, cells) = risen.last()?;
+        let rover_from_site = self.stops.site_from_rover(*at).inverse();
+        let ahead = |cell: &[f64; 2]| (rover_from_site * Point3::new(cell[0], cell[1], 0.0)).x;
+        let mut ahead_m: Vec<f64> = cells.iter().map(ahead).collect();
+        ahead_m.sort_by(f64::total_cmp);
+        let counts = risen.iter().map(|(_, cells)| cells.len());
+        let (fewest, most) = (counts.clone().min()?, counts.max()?);
+        let sentence = format!(
+            "The obstacle is false: since stop {from} it is ahead of the rover wherever that stands, on ground that was measured lower at \
+             the stop before."
+        );
+        let where_is = format!(
+            "At {} of the stops since then, {fewest} to {most} cells are more than {:.0} cm higher than at the stop before; at stop {at} \
+             they are about {} ahead.",
+            risen.len(),
+            100.0 * RISEN_M,
+            metres(ahead_m[ahead_m.len() / 2])
+        );
+        let what = "Either its stereo matches are false, or something that moves with the rover is in view: look at the images of the \
+                    hazard pair."
+            .to_owned();
+        Some(Found { cause: StopCause::FalseObstacle, sentence, evidence: vec![where_is, what] })
+    }
+
+    /// Ground beyond a limit under every path, or under every arc of a rover that turns to and fro.
+    pub(super) fn no_safe_path(&self) -> Option<Found> {
+        let turns = match self.reason()? {
+            StopReason::NoSafePath => None,
+            StopReason::GoalBlocked => {
+                let choice = self.choice()?;
+                let encloses = choice.blocked_goal.is_some_and(|blocked| blocked.ground.is_none());
+                (encloses && has_no_arc(choice)).then_some(())?;
+                None
+            }
+            StopReason::LimitCycle => {
+                let round = self.round()?;
+                round.iter().all(|cycle| cycle.choice.as_ref().is_some_and(has_no_arc)).then_some(())?;
+                Some(round.iter().map(|cycle| cycle.step).collect::<Vec<usize>>())
+            }
+            _ => return None,
+        };
+        let choice = self.choice().or_else(|| self.round()?.last()?.choice.as_ref())?;
+        let mut by_term = BTreeMap::<HazardTerm, Vec<Veto>>::new();
+        for veto in choice.candidates.iter().filter_map(|candidate| candidate.veto) {
+            by_term.entry(veto.term).or_default().push(veto);
+        }
+        let (term, vetoes) = by_term.iter().max_by_key(|(_, vetoes)| vetoes.len())?;
+        // The one nearest to its limit is the one that a person would look at.
+        let least = vetoes.iter().min_by(|a, b| a.value.total_cmp(&b.value))?;
+        let most = vetoes.iter().map(|veto| veto.value).fold(0.0, f64::max);
+        let count = choice.candidates.len();
+        let part = if vetoes.len() == count {
+            format!("all {count}")
+        } else {
+            format!("{} of {count}", vetoes.len())
+        };
+        let ground = if *term == HazardTerm::Unknown {
+            "the share of unknown cells".to_owned()
+        } else {
+            format!("the {} of the ground", term.word())
+        };
+        let sentence = format!(
+            "No path is safe: {ground} vetoes {part} paths; it is {} to {}, limit {}.",
+            term.text(least.value),
+            term.text(most),
+            term.text(least.limit)
+        );
+        let turns = turns.map(|stops| {
+            format!(
+                "The rover only turns to and fro ({}): at none of these stops an arc is safe.",
+                listed("stop", &stops)
+            )
+        });
+        let nearest = format!(
+            "The failing cell nearest to its limit is at x {:.1} m, y {:.1} m of the site, {} along its path: {} {} ({} over the limit).",
+            least.in_site_m[0],
+            least.in_site_m[1],
+            metres(least.along_m),
+            term.word(),
+            term.text(least.value),
+            term.text(least.value - least.limit)
+        );
+        let others: Vec<String> = by_term
+            .iter()
+            .filter(|(other, _)| *other != term)
+            .map(|(other, vetoes)| format!("{} by {}", vetoes.len(), other.word()))
+            .collect();
+        let others = (!others.is_empty()).then(|| format!("Other vetoes: {}.", others.join(", ")));
+        let seen: Vec<usize> = self.hazards.last().map(|hazards| hazards.step).into_iter().collect();
+        let points = self
+            .cycles
+            .last()?
+            .range_points
+            .map(|points| format!("The hazard pair of {} gives {points} points.", listed("stop", &seen)));
+        let fixed = self.of_limits().is_empty().then(|| "No single raised limit opens a path.".to_owned());
+        let evidence = [turns, Some(nearest), others, points, fixed].into_iter().flatten().collect();
+        Some(Found { cause: StopCause::NoSafePath, sentence, evidence })
+    }
+}
+
+/// Whether every arc of a decision is vetoed.
+pub(super) fn has_no_arc(choice: &PathChoice) -> bool {
+    let mut arcs =
+        choice.candidates.iter().filter(|candidate| matches!(candidate.motion, Motion::Arc { .. }));
+    arcs.all(|candidate| candidate.veto.is_some())
+}
+
+/// Centres of the cells that are higher at a stop than they were measured at the one before, site frame, m.
+fn risen_between(before: &StopHazards, now: &StopHazards) -> Vec<[f64; 2]> {
+    let grid = &now.map.grid;
+    let is_risen = |(at, cell): &([f64; 2], &GoodnessCell)| {
+        let was = before.map.cell_at(*at).and_then(|cell| cell.height_m);
+        // z points down.
+        was.zip(cell.height_m).is_some_and(|(was, is)| was - is > RISEN_M)
+    };
+    let cells = now.map.cells.iter().enumerate().map(|(index, cell)| (grid.centre_m(index), cell));
+    cells.filter(is_risen).map(|(at, _)| at).collect()
+}

@@ -1,0 +1,161 @@
+//! Changes with which the decision at the last stop is another: one field of the command, or one limit of the hazard map.
+//!
+//! Each change of the command is verified by deciding again with it, on the images and the map of that stop.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use sightline_rover::driving::executive::{self, CycleInput};
+use sightline_rover::driving::{
+    Cycle, DriveCommand, Ending, GoalRule, NavigatorKind, PathInput, SlipCheck, StopReason,
+};
+use sightline_rover::navigation::counterfactual::counterfactual;
+use sightline_rover::navigation::{HazardNavigator, NavigatorPreset};
+
+use super::StoppedDrive;
+use super::blocked::has_no_arc;
+use super::words::motion;
+use crate::format::number;
+
+/// A change with which the decision is another.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct DecisionChange {
+    /// What is changed, with the new and the present value.
+    pub text: String,
+    /// What is decided with it.
+    pub decision: String,
+    /// The command with the change; null for a limit that is no part of a command.
+    pub command: Option<DriveCommand>,
+}
+
+impl StoppedDrive<'_> {
+    /// All changes that lead to another decision than `ending`.
+    pub(super) fn changes(&self, ending: &Ending) -> Vec<DecisionChange> {
+        let mut changes: Vec<DecisionChange> =
+            self.candidates(ending).into_iter().filter_map(|change| self.verified(ending, change)).collect();
+        changes.extend(self.of_limits());
+        changes
+    }
+
+    /// Changes of the command that may lead to another decision.
+    fn candidates(&self, ending: &Ending) -> Vec<(String, DriveCommand)> {
+        let command = self.command;
+        let mut all = Vec::new();
+        let mut try_with = |text: String, change: &dyn Fn(&mut DriveCommand)| {
+            let mut changed = command.clone();
+            change(&mut changed);
+            all.push((text, changed));
+        };
+        let raised = |value: f64, step: f64| (value / step).floor() * step + step;
+        let instead = |name: &str, new: &str, old: &str| format!("{name} {new} instead of {old}");
+        match (ending.reason, ending.value) {
+            (StopReason::Slip, Some(slip)) => {
+                let new = raised(slip, 0.05);
+                try_with(instead("slip_max", &number(new), &number(command.slip_max)), &|c| c.slip_max = new);
+                if command.slip_check == SlipCheck::Command {
+                    try_with(instead("slip_check", "wheels", "command"), &|c| {
+                        c.slip_check = SlipCheck::Wheels
+                    });
+                }
+            }
+            (StopReason::OdometryRefused, Some(_)) => {
+                let old = command.refusals_max.map_or_else(|| "none".to_owned(), |most| most.to_string());
+                try_with(instead("refusals_max", "none", &old), &|c| c.refusals_max = None);
+            }
+            (StopReason::Tilt, Some(tilt_deg)) => {
+                let new = raised(tilt_deg, 1.0);
+                try_with(instead("tilt_max_deg", &number(new), &number(command.tilt_max_deg)), &|c| {
+                    c.tilt_max_deg = new
+                });
+            }
+            (StopReason::Time, Some(minutes)) => {
+                let new = raised(minutes, 10.0);
+                let text = instead("flight_minutes_max", &number(new), &number(command.flight_minutes_max));
+                try_with(text, &|c| c.flight_minutes_max = new);
+            }
+            (StopReason::StopLimit, _) => {
+                let new = (command.stops_max + 50).min(1000);
+                let text = instead("stops_max", &new.to_string(), &command.stops_max.to_string());
+                try_with(text, &|c| c.stops_max = new);
+            }
+            (StopReason::Lost, _) => {
+                try_with(instead("goal", "fixed", "follows_target"), &|c| c.goal = GoalRule::Fixed);
+            }
+            _ => {}
+        }
+        let distance_m = self.cycles.last().map_or(f64::INFINITY, |last| last.goal.distance_m);
+        let tolerance_m = raised(distance_m, 0.01);
+        if tolerance_m <= 1.0 && tolerance_m < command.standoff_m && ending.reason != StopReason::Lost {
+            let text = instead("tolerance_m", &number(tolerance_m), &number(command.tolerance_m));
+            try_with(text, &|c| c.tolerance_m = tolerance_m);
+        }
+        if command.navigator.needs_map() {
+            for other in [NavigatorKind::Gestalt, NavigatorKind::Morphin, NavigatorKind::Arcs] {
+                if other != command.navigator {
+                    let text = instead("navigator", other.name(), command.navigator.name());
+                    try_with(text, &|c| c.navigator = other);
+                }
+            }
+        }
+        all
+    }
+
+    /// The change with its decision, if that is another.
+    fn verified(&self, ending: &Ending, (text, command): (String, DriveCommand)) -> Option<DecisionChange> {
+        command.validate().ok()?;
+        let decided = self.decide(&command)?;
+        let reason = decided.ending.as_ref().map(|ending| ending.reason);
+        if reason == Some(ending.reason) {
+            return None;
+        }
+        let decision = match (&decided.motion, reason) {
+            (_, Some(reason)) => reason.word().to_owned(),
+            (Some(next), None) => format!("the drive goes on: {}", motion(next)),
+            (None, None) => "the drive goes on".to_owned(),
+        };
+        Some(DecisionChange { text, decision, command: Some(command) })
+    }
+
+    /// The decision at the last stop under another command.
+    fn decide(&self, command: &DriveCommand) -> Option<Cycle> {
+        let last = self.steps.len() - 1;
+        let input = CycleInput {
+            command,
+            navigator: &*command.navigator.navigator(),
+            first: self.steps.first()?,
+            last: self.steps.get(last)?,
+            before: last.checked_sub(1).and_then(|before| self.cycles.get(before)),
+            hazards: self.hazards.last().map(|hazards| &**hazards),
+        };
+        Some(executive::decide(self.stops, &input))
+    }
+
+    /// Limits of the hazard map with which paths are open.
+    pub(super) fn of_limits(&self) -> Vec<DecisionChange> {
+        let preset = match self.command.navigator {
+            NavigatorKind::Arcs => return Vec::new(),
+            NavigatorKind::Gestalt => NavigatorPreset::Gestalt,
+            NavigatorKind::Morphin => NavigatorPreset::Morphin,
+        };
+        let Some(last) = self.cycles.last() else { return Vec::new() };
+        let choice = last.choice.as_ref().filter(|choice| has_no_arc(choice));
+        let (Some(choice), Some(hazards)) = (choice, self.hazards.last()) else { return Vec::new() };
+        let site_from_rover = self.stops.site_from_rover(last.step);
+        let input = PathInput {
+            goal_m: last.goal.in_rover_m,
+            step_m: 0.0,
+            curvature_per_m: 0.0,
+            map: Some(&hazards.map),
+            site_from_rover: &site_from_rover,
+        };
+        let settings = HazardNavigator { settings: preset.settings() }.settings;
+        counterfactual(choice, &input, &settings, None)
+            .into_iter()
+            .map(|change| DecisionChange {
+                text: format!("{} {} ({})", change.setting, number(change.setting_value), change.sentence()),
+                decision: format!("{} safe paths", change.opens.len()),
+                command: None,
+            })
+            .collect()
+    }
+}
