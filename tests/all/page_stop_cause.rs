@@ -16,14 +16,15 @@ async fn a_drive_without_a_safe_path_is_explained_and_a_branch_arrives_another_w
     browser.wait_status("the end of the drive", "s.session === 's2' && s.drive === 'no safe path'").await;
     browser.says("WHY THE DRIVE STOPPED").await;
     browser.says("No path is safe: the tilt of the ground vetoes").await;
+    browser.click_on("button", "Evidence and changes").await;
     browser.says("over the limit").await;
     browser.shot("stop-cause").await;
     let why = bench.json("/api/v1/sessions/s2/drive")["why"].clone();
     assert_eq!(why["cause"], "no_safe_path", "{why}");
 
-    // The change is put into the form, and a branch at the stop drives under it.
+    // The change is put into the form, and a branch before the stop drives under it.
     browser.click_on("button", "use navigator arcs instead of gestalt").await;
-    browser.control("button", "Branch at stop 0").await;
+    browser.go_to("0", 0).await;
     browser.click_on("button", "Branch at stop 0").await;
     browser.wait_status("the branch", "s.session === 's3' && s.drive === 'arrived'").await;
     browser.shot("stop-cause-branch").await;

@@ -42,7 +42,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
                 buttons(ui, state, drive, out);
                 standing(ui, drive);
                 if let Some(why) = &drive.why {
-                    why::show(ui, why, out);
+                    why::headline(ui, why, out);
                 }
                 decisions(ui, state, drive, out);
             }

@@ -1,31 +1,32 @@
 //! Why the drive stopped: a card with the cause and its evidence, and the changes with which it would have gone on.
 
 use egui::{Frame, Label, Margin, RichText, Stroke, Ui};
-use sightline_session::stop_cause::StopExplanation;
+use sightline_session::stop_cause::{DecisionChange, StopExplanation};
 
-use crate::command::Command;
+use crate::command::{Command, Go};
 use crate::driving::Ask;
+use crate::layout::command::LayoutCommand;
+use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::theme;
 
-/// Shows why the drive stopped, if it did so at the cursor's stop.
-pub(crate) fn show_here(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
-    let why = state.drive().and_then(|drive| drive.why.as_ref());
-    if let Some(why) = why.filter(|why| why.step == state.cursor.step) {
-        show(ui, why, out);
-    }
+/// Shows the cause in one sentence, with a button that leads to its evidence.
+pub(crate) fn headline(ui: &mut Ui, why: &StopExplanation, out: &mut Vec<Command>) {
+    card(ui, |ui| {
+        sentence(ui, why);
+        if ui.button("Evidence and changes").on_hover_text("The panel Why at the last stop").clicked() {
+            out.push(Command::Go(Go::Step(why.step)));
+            out.push(Command::Layout(LayoutCommand::Show(Pane::Why)));
+        }
+    });
 }
 
-/// Shows why a drive stopped.
-pub(crate) fn show(ui: &mut Ui, why: &StopExplanation, out: &mut Vec<Command>) {
-    let frame =
-        Frame::new().stroke(Stroke::new(1.5, theme::failed())).corner_radius(4).inner_margin(Margin::same(6));
-    frame.show(ui, |ui| {
-        ui.set_min_width(ui.available_width());
-        ui.spacing_mut().item_spacing.y = 3.0;
-        ui.label(theme::title("why the drive stopped"));
-        let headline = RichText::new(&why.sentence).size(14.0).strong().color(theme::strong());
-        ui.add(Label::new(headline).wrap());
+/// Shows why the drive stopped, if it did so at the cursor's stop: the cause, its evidence, and changes of the command.
+pub(crate) fn show_here(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let why = state.drive().and_then(|drive| drive.why.as_ref());
+    let Some(why) = why.filter(|why| why.step == state.cursor.step) else { return };
+    card(ui, |ui| {
+        sentence(ui, why);
         for sentence in &why.evidence {
             ui.add(Label::new(RichText::new(format!("• {sentence}")).size(12.0).color(theme::text())).wrap());
         }
@@ -33,18 +34,39 @@ pub(crate) fn show(ui: &mut Ui, why: &StopExplanation, out: &mut Vec<Command>) {
             ui.label(theme::note("Other decisions on the images of this stop:"));
         }
         for change in &why.changes {
-            ui.horizontal_wrapped(|ui| {
-                if let Some(command) = &change.command {
-                    let help = "Puts this command into the form; a branch at an earlier stop drives under it";
-                    let name = format!("use {}", change.text);
-                    let button = ui.small_button("Use").accessible_name(name).on_hover_text(help);
-                    if button.clicked() {
-                        out.push(Command::Drive(Ask::Form(command.clone())));
-                    }
-                }
-                let words = format!("{}: {}", change.text, change.decision);
-                ui.add(Label::new(RichText::new(words).size(12.0).color(theme::text())).wrap());
-            });
+            changed(ui, change, out);
         }
+    });
+}
+
+/// A change with its decision, and the button that puts it into the form.
+fn changed(ui: &mut Ui, change: &DecisionChange, out: &mut Vec<Command>) {
+    ui.horizontal_wrapped(|ui| {
+        if let Some(command) = &change.command {
+            let help = "Puts this command into the form of the panel Drive; a branch at an earlier stop drives under it";
+            let name = format!("use {}", change.text);
+            if ui.small_button("Use").accessible_name(name).on_hover_text(help).clicked() {
+                out.push(Command::Drive(Ask::Form(command.clone())));
+                out.push(Command::Layout(LayoutCommand::Show(Pane::Drive)));
+            }
+        }
+        let words = format!("{}: {}", change.text, change.decision);
+        ui.add(Label::new(RichText::new(words).size(12.0).color(theme::text())).wrap());
+    });
+}
+
+fn sentence(ui: &mut Ui, why: &StopExplanation) {
+    ui.label(theme::title("why the drive stopped"));
+    let sentence = RichText::new(&why.sentence).size(14.0).strong().color(theme::strong());
+    ui.add(Label::new(sentence).wrap());
+}
+
+fn card(ui: &mut Ui, show: impl FnOnce(&mut Ui)) {
+    let frame =
+        Frame::new().stroke(Stroke::new(1.5, theme::failed())).corner_radius(4).inner_margin(Margin::same(6));
+    frame.show(ui, |ui| {
+        ui.set_min_width(ui.available_width());
+        ui.spacing_mut().item_spacing.y = 3.0;
+        show(ui);
     });
 }
