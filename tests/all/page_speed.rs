@@ -96,12 +96,7 @@ async fn steps_are_quick_an_idle_page_rests_and_memory_is_bounded() {
     // There and back once, so that everything is cached; then there and back again, watched.
     walk(&browser, &[0, last, 0]).await;
     stopwatch::begin(&browser, Painting::On).await;
-    let before = browser.taken();
     walk(&browser, &[0, last, 0]).await;
-    if let (Some(before), Some(after)) = (before, browser.taken()) {
-        let ms = 1000.0 * (after.page_thread_s - before.page_thread_s) / (2 * last) as f64;
-        println!("processor time of the page's thread: {ms:.1} ms a cached step, all its frames included");
-    }
     tell("cached steps", &stopwatch::laps(&browser).await, 2 * last);
     stopwatch::begin(&browser, Painting::Off).await;
     walk(&browser, &[0, last, 0]).await;

@@ -10,8 +10,6 @@ pub struct Taken {
     pub cpu_s: f64,
     /// Resident memory of the process that runs the page, bytes.
     pub page_bytes: u64,
-    /// Processor time of the thread that runs the page, s: its scripts, its layout and what it asks the browser to paint.
-    pub page_thread_s: f64,
 }
 
 /// What `root` and its descendants have taken; none where the system has no `/proc`.
@@ -45,20 +43,10 @@ pub(crate) fn taken(root: u64) -> Option<Taken> {
         let folder = Path::new("/proc").join(id.to_string());
         let command = std::fs::read(folder.join("cmdline")).unwrap_or_default();
         if String::from_utf8_lossy(&command).contains("--type=renderer") {
-            let bytes = resident(&folder);
-            if bytes > all.page_bytes {
-                (all.page_bytes, all.page_thread_s) = (bytes, main_thread_s(&folder, id));
-            }
+            all.page_bytes = all.page_bytes.max(resident(&folder));
         }
     }
     Some(all)
-}
-
-/// Processor time of the first thread of a process, s; 0 where the system does not tell.
-fn main_thread_s(folder: &Path, id: u64) -> f64 {
-    let path = folder.join("task").join(id.to_string()).join("schedstat");
-    let told = std::fs::read_to_string(path).unwrap_or_default();
-    told.split(' ').next().and_then(|nanoseconds| nanoseconds.parse::<f64>().ok()).unwrap_or(0.0) / 1e9
 }
 
 /// Resident memory of a process, bytes.
