@@ -86,6 +86,19 @@ impl Preset {
         }
     }
 
+    /// The panel that a narrow window has in front beside the left image.
+    pub(crate) const fn lead(self) -> Pane {
+        match self {
+            Self::Overview | Self::Image => Pane::Targets,
+            Self::Match => Pane::Strip,
+            Self::Stereo => Pane::Right,
+            Self::Map => Pane::Map,
+            Self::Compare => Pane::Runs,
+            Self::Studies => Pane::Studies,
+            Self::Report => Pane::Notes,
+        }
+    }
+
     /// The arrangement for images of this shape.
     pub fn tree(self, shape: ImageShape) -> Tree<Pane> {
         let mut tiles = Tiles::default();

@@ -93,6 +93,7 @@ impl Workspace {
         match command {
             LayoutCommand::Use(preset) => {
                 (self.tree, self.preset, self.maximised) = (preset.tree(self.shape), preset, None);
+                bring_to_front(&mut self.narrow, preset.lead());
             }
             LayoutCommand::Show(pane) => self.show_panel(pane),
             LayoutCommand::Close(pane) => self.close(pane),
@@ -148,7 +149,8 @@ impl Workspace {
         if tree.tiles.find_pane(&pane).is_none() {
             bring_back(tree, pane);
         }
-        tree.make_active(|_, tile| matches!(tile, Tile::Pane(other) if *other == pane));
+        // In the other one, too: a window may be resized.
+        [&mut self.tree, &mut self.narrow].into_iter().for_each(|tree| bring_to_front(tree, pane));
     }
 
     fn close(&mut self, pane: Pane) {
@@ -189,6 +191,10 @@ impl Workspace {
         self.current = panels.current;
         self.seen.clone_from(&panels.seen);
     }
+}
+
+fn bring_to_front(tree: &mut Tree<Pane>, pane: Pane) {
+    tree.make_active(|_, tile| matches!(tile, Tile::Pane(other) if *other == pane));
 }
 
 /// What stands where every panel was closed.
@@ -294,6 +300,22 @@ mod tests {
             let restored = Workspace::restored(Some(text));
             assert!(restored.closed().is_empty(), "{text}");
             assert_eq!(restored.preset(), Preset::Overview);
+        }
+    }
+
+    #[test]
+    fn a_window_that_becomes_narrow_has_in_front_what_was_shown_last() {
+        let mut workspace = Workspace::default();
+        let has_in_front = |workspace: &Workspace, pane: Pane| {
+            let tree = &workspace.narrow;
+            let shown = tree.active_tiles().into_iter().filter_map(|id| tree.tiles.get_pane(&id));
+            shown.copied().any(|shown| shown == pane)
+        };
+        workspace.apply(LayoutCommand::Show(Pane::Why));
+        assert!(has_in_front(&workspace, Pane::Why) && has_in_front(&workspace, Pane::Left));
+        for preset in Preset::ALL {
+            workspace.apply(LayoutCommand::Use(preset));
+            assert!(has_in_front(&workspace, preset.lead()), "{preset:?}");
         }
     }
 
