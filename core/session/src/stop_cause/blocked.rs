@@ -73,78 +73,83 @@ impl StoppedDrive<'_> {
 
     /// Ground beyond a limit under every path, or under every arc of a rover that turns to and fro.
     pub(super) fn no_safe_path(&self) -> Option<Found> {
-        let turns = match self.reason()? {
-            StopReason::NoSafePath => None,
-            StopReason::GoalBlocked => {
-                let choice = self.choice()?;
-                let encloses = choice.blocked_goal.is_some_and(|blocked| blocked.ground.is_none());
-                (encloses && has_no_arc(choice)).then_some(())?;
-                None
-            }
-            StopReason::LimitCycle => {
-                let round = self.round()?;
-                round.iter().all(|cycle| cycle.choice.as_ref().is_some_and(has_no_arc)).then_some(())?;
-                Some(round.iter().map(|cycle| cycle.step).collect::<Vec<usize>>())
-            }
-            _ => return None,
-        };
+        let turns = self.stops_without_arc()?;
         let choice = self.choice().or_else(|| self.round()?.last()?.choice.as_ref())?;
         let mut by_term = BTreeMap::<HazardTerm, Vec<Veto>>::new();
         for veto in choice.candidates.iter().filter_map(|candidate| candidate.veto) {
             by_term.entry(veto.term).or_default().push(veto);
         }
         let (term, vetoes) = by_term.iter().max_by_key(|(_, vetoes)| vetoes.len())?;
-        // The one nearest to its limit is the one that a person would look at.
-        let least = vetoes.iter().min_by(|a, b| a.value.total_cmp(&b.value))?;
-        let most = vetoes.iter().map(|veto| veto.value).fold(0.0, f64::max);
-        let count = choice.candidates.len();
-        let part = if vetoes.len() == count {
-            format!("all {count}")
-        } else {
-            format!("{} of {count}", vetoes.len())
-        };
-        let ground = if *term == HazardTerm::Unknown {
-            "the share of unknown cells".to_owned()
-        } else {
-            format!("the {} of the ground", term.word())
-        };
-        let sentence = format!(
-            "No path is safe: {ground} vetoes {part} paths; it is {} to {}, limit {}.",
-            term.text(least.value),
-            term.text(most),
-            term.text(least.limit)
-        );
-        let turns = turns.map(|stops| {
-            format!(
-                "The rover only turns to and fro ({}): at none of these stops an arc is safe.",
-                listed("stop", &stops)
-            )
+        let turns = (!turns.is_empty()).then(|| {
+            let stops = listed("stop", &turns);
+            format!("The rover only turns to and fro ({stops}): at none of these stops an arc is safe.")
         });
-        let nearest = format!(
-            "The failing cell nearest to its limit is at x {:.1} m, y {:.1} m of the site, {} along its path: {} {} ({} over the limit).",
-            least.in_site_m[0],
-            least.in_site_m[1],
-            metres(least.along_m),
-            term.word(),
-            term.text(least.value),
-            term.text(least.value - least.limit)
-        );
         let others: Vec<String> = by_term
             .iter()
             .filter(|(other, _)| *other != term)
             .map(|(other, vetoes)| format!("{} by {}", vetoes.len(), other.word()))
             .collect();
         let others = (!others.is_empty()).then(|| format!("Other vetoes: {}.", others.join(", ")));
-        let seen: Vec<usize> = self.hazards.last().map(|hazards| hazards.step).into_iter().collect();
-        let points = self
-            .cycles
-            .last()?
-            .range_points
-            .map(|points| format!("The hazard pair of {} gives {points} points.", listed("stop", &seen)));
-        let fixed = self.of_limits().is_empty().then(|| "No single raised limit opens a path.".to_owned());
-        let evidence = [turns, Some(nearest), others, points, fixed].into_iter().flatten().collect();
+        let last = self.cycles.last()?;
+        let points = last.range_points.map(|points| {
+            format!("The hazard pair of {} gives {points} points.", listed("stop", &[last.step]))
+        });
+        let is_fixed = self.choice().is_some() && self.of_limits().is_empty();
+        let fixed = is_fixed.then(|| "No single raised limit opens a path.".to_owned());
+        let evidence = [turns, Some(nearest(vetoes)?), others, points, fixed].into_iter().flatten().collect();
+        let sentence = vetoed(vetoes, choice.candidates.len())?;
         Some(Found { cause: StopCause::NoSafePath, sentence, evidence })
     }
+
+    /// The stops between which a rover without a safe arc turned to and fro: none if it stays. `None` if it has a safe arc, or ended for
+    /// another reason.
+    fn stops_without_arc(&self) -> Option<Vec<usize>> {
+        match self.reason()? {
+            StopReason::NoSafePath => Some(Vec::new()),
+            StopReason::GoalBlocked => {
+                let choice = self.choice()?;
+                let encloses = choice.blocked_goal.is_some_and(|blocked| blocked.ground.is_none());
+                (encloses && has_no_arc(choice)).then(Vec::new)
+            }
+            StopReason::LimitCycle => {
+                let round = self.round()?;
+                let has_none = round.iter().all(|cycle| cycle.choice.as_ref().is_some_and(has_no_arc));
+                has_none.then(|| round.iter().map(|cycle| cycle.step).collect())
+            }
+            _ => None,
+        }
+    }
+}
+
+/// That these vetoes of one term, among so many paths, leave none.
+fn vetoed(vetoes: &[Veto], count: usize) -> Option<String> {
+    let values = || vetoes.iter().map(|veto| veto.value);
+    let (least, most) = (values().fold(f64::INFINITY, f64::min), values().fold(0.0, f64::max));
+    let Veto { term, limit, .. } = *vetoes.first()?;
+    let part = if vetoes.len() == count { "all".to_owned() } else { format!("{} of", vetoes.len()) };
+    let ground = match term {
+        HazardTerm::Unknown => "the share of unknown cells".to_owned(),
+        _ => format!("the {} of the ground", term.word()),
+    };
+    let [least, most, limit] = [least, most, limit].map(|value| term.text(value));
+    Some(format!(
+        "No path is safe: {ground} vetoes {part} {count} paths; it is {least} to {most}, limit {limit}."
+    ))
+}
+
+/// The failing cell that is nearest to its limit: the one that a person would look at.
+fn nearest(vetoes: &[Veto]) -> Option<String> {
+    let least = vetoes.iter().min_by(|a, b| a.value.total_cmp(&b.value))?;
+    let term = least.term;
+    Some(format!(
+        "The failing cell nearest to its limit is at x {:.1} m, y {:.1} m of the site, {} along its path: {} {} ({} over the limit).",
+        least.in_site_m[0],
+        least.in_site_m[1],
+        metres(least.along_m),
+        term.word(),
+        term.text(least.value),
+        term.text(least.value - least.limit)
+    ))
 }
 
 /// Whether every arc of a decision is vetoed.

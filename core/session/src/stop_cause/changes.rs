@@ -40,62 +40,19 @@ impl StoppedDrive<'_> {
     /// Changes of the command that may lead to another decision.
     fn candidates(&self, ending: &Ending) -> Vec<(String, DriveCommand)> {
         let command = self.command;
-        let mut all = Vec::new();
-        let mut try_with = |text: String, change: &dyn Fn(&mut DriveCommand)| {
-            let mut changed = command.clone();
-            change(&mut changed);
-            all.push((text, changed));
-        };
-        let raised = |value: f64, step: f64| (value / step).floor() * step + step;
-        let instead = |name: &str, new: &str, old: &str| format!("{name} {new} instead of {old}");
-        match (ending.reason, ending.value) {
-            (StopReason::Slip, Some(slip)) => {
-                let new = raised(slip, 0.05);
-                try_with(instead("slip_max", &number(new), &number(command.slip_max)), &|c| c.slip_max = new);
-                if command.slip_check == SlipCheck::Command {
-                    try_with(instead("slip_check", "wheels", "command"), &|c| {
-                        c.slip_check = SlipCheck::Wheels
-                    });
-                }
-            }
-            (StopReason::OdometryRefused, Some(_)) => {
-                let old = command.refusals_max.map_or_else(|| "none".to_owned(), |most| most.to_string());
-                try_with(instead("refusals_max", "none", &old), &|c| c.refusals_max = None);
-            }
-            (StopReason::Tilt, Some(tilt_deg)) => {
-                let new = raised(tilt_deg, 1.0);
-                try_with(instead("tilt_max_deg", &number(new), &number(command.tilt_max_deg)), &|c| {
-                    c.tilt_max_deg = new
-                });
-            }
-            (StopReason::Time, Some(minutes)) => {
-                let new = raised(minutes, 10.0);
-                let text = instead("flight_minutes_max", &number(new), &number(command.flight_minutes_max));
-                try_with(text, &|c| c.flight_minutes_max = new);
-            }
-            (StopReason::StopLimit, _) => {
-                let new = (command.stops_max + 50).min(1000);
-                let text = instead("stops_max", &new.to_string(), &command.stops_max.to_string());
-                try_with(text, &|c| c.stops_max = new);
-            }
-            (StopReason::Lost, _) => {
-                try_with(instead("goal", "fixed", "follows_target"), &|c| c.goal = GoalRule::Fixed);
-            }
-            _ => {}
-        }
+        let mut all = of_reason(command, ending);
         let distance_m = self.cycles.last().map_or(f64::INFINITY, |last| last.goal.distance_m);
         let tolerance_m = raised(distance_m, 0.01);
         if tolerance_m <= 1.0 && tolerance_m < command.standoff_m && ending.reason != StopReason::Lost {
-            let text = instead("tolerance_m", &number(tolerance_m), &number(command.tolerance_m));
-            try_with(text, &|c| c.tolerance_m = tolerance_m);
+            let values = [tolerance_m, command.tolerance_m].map(number);
+            all.push(changed(command, "tolerance_m", values, |c| c.tolerance_m = tolerance_m));
         }
-        if command.navigator.needs_map() {
-            for other in [NavigatorKind::Gestalt, NavigatorKind::Morphin, NavigatorKind::Arcs] {
-                if other != command.navigator {
-                    let text = instead("navigator", other.name(), command.navigator.name());
-                    try_with(text, &|c| c.navigator = other);
-                }
-            }
+        let others = [NavigatorKind::Gestalt, NavigatorKind::Morphin, NavigatorKind::Arcs];
+        for other in
+            others.into_iter().filter(|other| command.navigator.needs_map() && *other != command.navigator)
+        {
+            let values = [other, command.navigator].map(|navigator| navigator.name().to_owned());
+            all.push(changed(command, "navigator", values, |c| c.navigator = other));
         }
         all
     }
@@ -158,4 +115,62 @@ impl StoppedDrive<'_> {
             })
             .collect()
     }
+}
+
+/// Changes of the field whose check ended the drive.
+fn of_reason(command: &DriveCommand, ending: &Ending) -> Vec<(String, DriveCommand)> {
+    let with_number = |name: &str, values: [f64; 2], change: &dyn Fn(&mut DriveCommand)| {
+        changed(command, name, values.map(number), change)
+    };
+    match (ending.reason, ending.value) {
+        (StopReason::Slip, Some(slip)) => {
+            let new = raised(slip, 0.05);
+            let mut all = vec![with_number("slip_max", [new, command.slip_max], &|c| c.slip_max = new)];
+            if command.slip_check == SlipCheck::Command {
+                let values = ["wheels", "command"].map(str::to_owned);
+                all.push(changed(command, "slip_check", values, |c| c.slip_check = SlipCheck::Wheels));
+            }
+            all
+        }
+        (StopReason::OdometryRefused, _) => {
+            let old = command.refusals_max.map_or_else(|| "none".to_owned(), |most| most.to_string());
+            vec![changed(command, "refusals_max", ["none".to_owned(), old], |c| c.refusals_max = None)]
+        }
+        (StopReason::Tilt, Some(tilt_deg)) => {
+            let new = raised(tilt_deg, 1.0);
+            vec![with_number("tilt_max_deg", [new, command.tilt_max_deg], &|c| c.tilt_max_deg = new)]
+        }
+        (StopReason::Time, Some(minutes)) => {
+            let new = raised(minutes, 10.0);
+            let values = [new, command.flight_minutes_max];
+            vec![with_number("flight_minutes_max", values, &|c| c.flight_minutes_max = new)]
+        }
+        (StopReason::StopLimit, _) => {
+            let new = (command.stops_max + 50).min(1000);
+            let values = [new, command.stops_max].map(f64::from);
+            vec![with_number("stops_max", values, &|c| c.stops_max = new)]
+        }
+        (StopReason::Lost, _) => {
+            let values = ["fixed", "follows_target"].map(str::to_owned);
+            vec![changed(command, "goal", values, |c| c.goal = GoalRule::Fixed)]
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// A change of one field, with its new and present value in words.
+fn changed(
+    command: &DriveCommand,
+    name: &str,
+    [new, old]: [String; 2],
+    change: impl FnOnce(&mut DriveCommand),
+) -> (String, DriveCommand) {
+    let mut changed = command.clone();
+    change(&mut changed);
+    (format!("{name} {new} instead of {old}"), changed)
+}
+
+/// The next multiple of a step above a value.
+fn raised(value: f64, step: f64) -> f64 {
+    ((value / step).floor() + 1.0) * step
 }
