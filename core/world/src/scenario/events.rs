@@ -68,6 +68,7 @@ pub struct Occluder {
 /// would show an upright blotched patch across the rover's path; it moves with the rover.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
+#[schema(as = LensGhost)]
 pub struct Ghost {
     /// The pair, by its name in camera.further.
     pub camera: CameraName,
