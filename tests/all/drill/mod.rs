@@ -86,7 +86,7 @@ pub(crate) struct Watched<T> {
 }
 
 impl<T> Watched<T> {
-    /// Does some work; what is held afterwards is read `rest` later, or once its threads have ended.
+    /// Does some work. Threads, memory and descriptors are read `rest` after it, and again until idle threads have ended.
     fn of(server: &Killable, rest: Duration, work: impl FnOnce() -> T) -> Self {
         let process = server.id();
         let before = Held::by(process);

@@ -86,8 +86,8 @@ pub struct Ending {
     pub value: Option<f64>,
     /// The limit that it met; null where `value` is.
     pub limit: Option<f64>,
-    /// The reason in more detail: the smallest change of a limit that opens a path, what is wrong with the goal, why there are no range
-    /// data, or which stops are at one place; null for the other reasons.
+    /// Details: of `no_safe_path` the smallest change of a limit that opens a path, of `goal_blocked` why the goal cannot be reached, of
+    /// `no_range_data` why there are none, of `limit_cycle` the stops at one place; null for the other reasons.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub detail: Option<String>,
 }
@@ -145,7 +145,7 @@ pub(super) fn ending(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &Cycle) -
         .then(|| Ending::named(StopReason::LimitCycle, Some(limit_cycle::sentence(&visits))))
 }
 
-/// The first stop of each visit to the place of the last of the stops `first` to `last`, which is one of them.
+/// The first stop of each visit, among the stops `first` to `last`, to the place where the rover stands at `last`.
 pub fn visits(stops: &dyn Stops, [first, last]: [usize; 2]) -> Vec<usize> {
     let poses: Vec<Pose> = (first..=last).map(|step| stops.site_from_rover(step)).collect();
     limit_cycle::visits(&poses).into_iter().map(|index| first + index).collect()

@@ -11,7 +11,7 @@ use super::{Found, StopCause, StoppedDrive};
 
 /// Ground that is so much higher than it was measured at the stop before is other ground, m.
 const RISEN_M: f32 = 0.1;
-/// So many cells must have risen at a stop: at the foot of a rock that is seen better from near, up to nine do.
+/// Least number of risen cells at a stop: at the foot of a rock, which is seen better from near, up to nine rise.
 const RISEN_CELLS: usize = 10;
 /// At three of the last five stops.
 const LAST_STOPS: usize = 5;

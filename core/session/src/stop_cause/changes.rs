@@ -1,4 +1,4 @@
-//! Changes with which the decision at the last stop is another: one field of the command, or one limit of the hazard map.
+//! Changes that alter the decision at the last stop: one field of the command, or one limit of the hazard map.
 //!
 //! Each change of the command is verified by deciding again with it, on the images and the map of that stop.
 
@@ -17,12 +17,12 @@ use super::blocked::has_no_arc;
 use super::words::motion;
 use crate::format::number;
 
-/// A change with which the decision is another.
+/// A change that alters the decision.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct DecisionChange {
-    /// What is changed, with the new and the present value.
+    /// Field or setting, new value and present value.
     pub text: String,
-    /// What is decided with it.
+    /// The decision under the changed command or limit.
     pub decision: String,
     /// The command with the change; null for a limit that is no part of a command.
     pub command: Option<DriveCommand>,

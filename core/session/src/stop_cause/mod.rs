@@ -65,7 +65,7 @@ pub struct StopExplanation {
     pub sentence: String,
     /// Further sentences of evidence.
     pub evidence: Vec<String>,
-    /// Changes with which the decision at this stop would have been another, each verified on the images already taken.
+    /// Changes that alter the decision at this stop, each verified on the images already taken.
     pub changes: Vec<DecisionChange>,
 }
 

@@ -11,11 +11,11 @@ use crate::why::odometry::refusal;
 
 /// So many refused motions in a row are no chance.
 const REFUSALS_MIN: usize = 3;
-/// Gates that other motions fit as well.
+/// Gates that fail where other motions fit as well.
 const OF_REPETITION: [&str; 2] = ["odometry_ambiguity", "odometry_repetition"];
 
 impl StoppedDrive<'_> {
-    /// A slip that is what is left of a motion that ended early.
+    /// A slip that only reflects that the motion was ended early.
     pub(super) fn order_of_events(&self) -> Option<Found> {
         let last = self.cycles.last()?;
         let ending = last.ending.as_ref().filter(|ending| ending.reason == StopReason::Slip)?;
