@@ -52,7 +52,9 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             ui.label(theme::note("No study was started yet."));
         }
         for job in state.studies.jobs.iter().rev() {
-            show_job(ui, state, job, out);
+            // A fixed id: a press that arrives a frame late must not meet another job's button.
+            let own = egui::UiBuilder::new().scope_id(egui::Id::unique(("study", &job.id)));
+            ui.scope_builder(own, |ui| show_job(ui, state, job, out));
         }
         table::show(ui, state);
     });
@@ -126,14 +128,15 @@ fn show_job(ui: &mut Ui, state: &State, job: &StudyJob, out: &mut Vec<Command>) 
     ui.horizontal_wrapped(|ui| {
         ui.label(RichText::new(&job.study).strong().color(theme::strong())).on_hover_text(&job.command);
         ui.label(RichText::new(word).color(colour));
+        // Before all that changes as the study goes on, so that they stay where they are.
+        if !figure::is_on_paper() {
+            buttons(ui, state, job, out);
+        }
         if job.n > 0 {
             ui.label(theme::number(format!("{} of {}", job.k, counted(job.n, "run"))).size(11.0));
         }
         if let Some(left) = estimate::left(job) {
             ui.label(theme::note(left));
-        }
-        if !figure::is_on_paper() {
-            buttons(ui, state, job, out);
         }
     });
     let settings = estimate::settings(job);

@@ -1,6 +1,6 @@
 //! The panel of the validation experiments.
 
-use egui_kittest::kittest::Queryable;
+use egui_kittest::kittest::{NodeT, Queryable};
 use sightline_api::endpoint::Call;
 use sightline_api::endpoints::{CancelStudy, ListStudies, ListStudyJobs, ShowStudyRows, StartStudy};
 use sightline_api::event::Event;
@@ -117,6 +117,26 @@ fn a_job_says_how_far_it_is_and_can_be_stopped_or_read() {
     assert_eq!(done.click("Result"), vec![Command::LookAtStudy("j1".to_owned())]);
     let mut stopped = Shown::pane(Pane::Studies, |_| with_job(StudyState::Cancelled));
     assert_eq!(stopped.click("Resume"), vec![Command::ResumeStudy("j1".to_owned())]);
+}
+
+#[test]
+fn the_buttons_of_a_study_stay_the_same_while_it_begins_and_another_one_is_started() {
+    // A press is carried out a frame after the control was found, so another one must not have its place and number.
+    let shown = |first: StudyJob, other: Option<StudyJob>| {
+        Shown::pane(Pane::Studies, move |_| {
+            let mut page = with_job(StudyState::Running);
+            page.studies.jobs = std::iter::once(first).chain(other).collect();
+            page
+        })
+    };
+    let waiting = StudyJob { n: 0, k: 0, ..job(StudyState::Waiting, 0) };
+    let before = shown(waiting, None);
+    let before = before.harness.get_by_label("Cancel").accesskit_node().id();
+    let running = shown(job(StudyState::Running, 3), None);
+    assert_eq!(running.harness.get_by_label("Cancel").accesskit_node().id(), before);
+    let other = StudyJob { id: "j2".to_owned(), ..job(StudyState::Done, 4) };
+    let two = shown(job(StudyState::Running, 3), Some(other));
+    assert_eq!(two.harness.get_by_label("Cancel").accesskit_node().id(), before);
 }
 
 #[test]
