@@ -141,6 +141,7 @@ fn stop(number: usize, poses: [&Pose; 2], mast_angles: Option<MastAngles>, wheel
         wheel_places_m: Vec::new(),
         odometry: None,
         odometry_alone: false,
+        mast_target: None,
         measured_tilt_deg: None,
         awaits: None,
     }

@@ -11,7 +11,7 @@ use sightline_api::event::Event;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_recordings::DrivenTraverse;
-use sightline_rover::driving::{DriveCommand, HazardMaps, OdometryPair, executive, odometry};
+use sightline_rover::driving::{Cycle, DriveCommand, Ending, HazardMaps, OdometryPair, executive, odometry};
 use sightline_rover::pipeline::Stops;
 use sightline_session::Run;
 use sightline_session::driving::{self, DriveView, Steering};
@@ -133,8 +133,18 @@ pub(crate) fn copy(from: &Path, to: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Drives from the last stop to the next on the estimates of `steps`, and returns the drive as it is then; `None` where it
-/// ends at the last stop, or somebody else drove on from there. The mast is pointed and the images are due if no pause is before.
+/// What became of a drive to another stop.
+pub(crate) enum DrivenOn {
+    /// The drive with a stop more.
+    Grown(Arc<OpenTraverse>),
+    /// It ends at the last stop.
+    Ended(Ending),
+    /// Somebody else drove on from there.
+    Overtaken,
+}
+
+/// Drives from the last stop to the next on the estimates of `steps`. The mast is pointed and the images are due if no pause is
+/// before.
 ///
 /// # Errors
 /// A drive that is none on commands, ground that cannot be driven on, a folder that cannot be written, or
@@ -144,19 +154,19 @@ pub(crate) fn drive_on(
     steering: &Steering,
     steps: &[Arc<RunStep>],
     cancel: &CancelFlag,
-) -> Result<Option<Arc<OpenTraverse>>> {
+) -> Result<DrivenOn> {
     let Some(driven) = &open.driven else {
         let problem = "this drive was planned or recorded before; it is replayed and cannot be driven on";
         return Err(Error::Request(problem.to_owned()));
     };
-    let (Some(first), Some(last)) = (steps.first(), steps.last()) else { return Ok(None) };
+    let (Some(first), Some(last)) = (steps.first(), steps.last()) else { return Ok(DrivenOn::Overtaken) };
     let (command, navigator) = (&steering.command, &*steering.command.navigator.navigator());
     let mut maps = lock(&driven.maps);
     // Images may have to be rendered: the world is free meanwhile.
     map_hazards(open, command, (first, undecided(driven, steps)), &mut maps, cancel.as_ref().into())?;
     let mut world = lock(&driven.world);
     if world.traverse().stop_count() != last.step + 1 {
-        return Ok(None);
+        return Ok(DrivenOn::Overtaken);
     }
     let before = driving::cycle_before(&world, command, &steps[..steps.len() - 1], &mut maps);
     let hazards = maps.at(world.traverse(), command, [&first.trace, &last.trace], cancel.as_ref().into())?;
@@ -174,7 +184,7 @@ pub(crate) fn drive_on(
     let moved = executive::drive(&mut *world, &input, cancel.as_ref().into());
     drop(world);
     let prepared = match moved {
-        Ok(cycle) if cycle.ending.is_some() => return Ok(None),
+        Ok(Cycle { ending: Some(ending), .. }) => return Ok(DrivenOn::Ended(ending)),
         Ok(_) => prepare_stop(driven, last, &steering.command, before, cancel),
         Err(error) => Err(error),
     };
@@ -185,7 +195,7 @@ pub(crate) fn drive_on(
     }
     let traverse = world.snapshot()?.with_cache(&driven.cache);
     drop(world);
-    Ok(Some(Arc::new(open.grown(traverse))))
+    Ok(DrivenOn::Grown(Arc::new(open.grown(traverse))))
 }
 
 /// The last steps of a run, from the first that the rover has not driven on from.
@@ -310,7 +320,9 @@ pub(crate) fn view(live: &LiveSession) -> DriveView {
         let _mapped = map_hazards(&open, &steering.command, missing, &mut maps, Cancel::default());
     }
     let mut explained = lock(&driven.explained);
-    driven.with(|world| DriveView::of(world, steering, &run, (&mut maps, &mut explained), is_driving))
+    let found =
+        driven.with(|world| DriveView::of(world, steering, &run, (&mut maps, &mut explained), is_driving));
+    DriveView { visits: live.with(|session| session.visits.clone()), ..found }
 }
 
 /// The drive of a session as a Rerun recording has it, with the hazard maps that are kept; `None` where nobody drives.

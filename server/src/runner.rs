@@ -37,6 +37,7 @@ use crate::rendering::OpenTraverse;
 use crate::requests_first::Requests;
 use crate::sessions::Sessions;
 use crate::stopwatch::Stopwatch;
+use crate::store::Store;
 
 /// What computes runs: the lane in which they wait, and where their progress is told.
 #[derive(Clone)]
@@ -47,6 +48,8 @@ pub(crate) struct Runner {
     traverses: OpenTraverses,
     /// All sessions, whose steps share the memory for them.
     sessions: Arc<Mutex<Sessions>>,
+    /// Where a session is kept that a drive sends to its next target.
+    store: Arc<Store>,
     limits: SharedLimits,
     /// They are answered before runs go on.
     requests: Arc<Requests>,
@@ -57,13 +60,14 @@ impl Runner {
     pub(crate) fn new(
         lane: Lane,
         events: broadcast::Sender<Event>,
-        traverses: &OpenTraverses,
-        sessions: &Arc<Mutex<Sessions>>,
+        (traverses, sessions): (&OpenTraverses, &Arc<Mutex<Sessions>>),
+        store: &Arc<Store>,
         limits: &SharedLimits,
         requests: &Arc<Requests>,
     ) -> Self {
-        let (sessions, limits, requests) = (Arc::clone(sessions), Arc::clone(limits), Arc::clone(requests));
-        Self { lane, events, traverses: Arc::clone(traverses), sessions, limits, requests }
+        let (traverses, sessions) = (Arc::clone(traverses), Arc::clone(sessions));
+        let (store, limits, requests) = (Arc::clone(store), Arc::clone(limits), Arc::clone(requests));
+        Self { lane, events, traverses, sessions, store, limits, requests }
     }
 
     /// The lane in which runs are computed.

@@ -12,6 +12,7 @@ use sightline_rover::driving::{ActiveWorld, DriveReport, FollowedCycle, Motion};
 use sightline_rover::pipeline::Stops;
 use sightline_rover::visual_odometry::MeasuredMotion;
 use sightline_track::locate::store::Cache;
+use sightline_track::target::Designation;
 
 use crate::jobs::lock;
 
@@ -67,6 +68,10 @@ impl ActiveWorld for SharedWorld<'_> {
 
     fn leave_to_odometry(&mut self) -> Result<()> {
         self.change(DrivenTraverse::leave_to_odometry)
+    }
+
+    fn keep_mast_target(&mut self, target: Designation) -> Result<()> {
+        self.change(|world| world.keep_mast_target(target))
     }
 
     fn point_mast(&mut self, angles: Option<MastAngles>) -> Result<()> {

@@ -167,7 +167,7 @@ impl AppState {
             given,
             making_drives: Mutex::default(),
             folders: folders.clone(),
-            runner: Runner::new(runs, events.clone(), &traverses, &sessions, &limits, &requests),
+            runner: Runner::new(runs, events.clone(), (&traverses, &sessions), &store, &limits, &requests),
             traverses,
             sessions,
             cache,

@@ -279,6 +279,9 @@ pub struct NewDrive {
     /// What the rover is told.
     #[serde(default)]
     pub command: DriveCommand,
+    /// The targets to which it drives afterwards, in this order, by their numbers.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub then: Vec<usize>,
     /// The stop from which it drives; left out: the last one of a drive on commands, the first one of any other.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub from_step: Option<usize>,

@@ -20,6 +20,7 @@ use sightline_rover::driving::{ActiveWorld, DriveReport, FollowedCycle, Motion, 
 use sightline_rover::pipeline::Stops;
 use sightline_rover::visual_odometry::MeasuredMotion;
 use sightline_track::cycle_stage::CycleStage;
+use sightline_track::target::Designation;
 use sightline_world::rover::driven::{DrivenStop, index_stops};
 use sightline_world::traverse::View;
 use sightline_world::{SCENARIO_FILE, Scenario, World};
@@ -334,6 +335,12 @@ impl ActiveWorld for DrivenTraverse {
     fn leave_to_odometry(&mut self) -> Result<()> {
         let number = self.driven.len() - 1;
         self.driven[number].odometry_alone = true;
+        self.put_last()
+    }
+
+    fn keep_mast_target(&mut self, target: Designation) -> Result<()> {
+        let number = self.driven.len() - 1;
+        self.driven[number].mast_target = Some(target);
         self.put_last()
     }
 

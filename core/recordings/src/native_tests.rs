@@ -42,6 +42,7 @@ fn stop(step: usize) -> Stop {
         metered_px: None,
         odometry: None,
         odometry_alone: false,
+        mast_target: None,
         truth: (step == 1).then(|| StopTruth {
             site_from_rover: PoseRecord::from(&pose.inverse()),
             left_camera: Some(camera(0.3)),

@@ -15,6 +15,7 @@ use sightline_geometry::frames::{Pixel, Vector3};
 use sightline_rover::driving::{ActiveWorld, DriveReport, FollowedCycle, Motion};
 use sightline_rover::pipeline::Stops;
 use sightline_rover::visual_odometry::MeasuredMotion;
+use sightline_track::target::Designation;
 
 use crate::native::Traverse;
 
@@ -109,6 +110,10 @@ impl ActiveWorld for Replayed<'_> {
     }
 
     fn leave_to_odometry(&mut self) -> Result<()> {
+        Ok(())
+    }
+
+    fn keep_mast_target(&mut self, _target: Designation) -> Result<()> {
         Ok(())
     }
 

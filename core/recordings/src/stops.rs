@@ -15,6 +15,7 @@ use sightline_rover::pipeline::Stops;
 use sightline_rover::visual_odometry::MeasuredMotion;
 use sightline_track::locate::store::Shared;
 use sightline_track::stages::capture::StereoPair;
+use sightline_track::target::Designation;
 use sightline_world::surface_point;
 use sightline_world::target_truth::TruthSource;
 
@@ -53,6 +54,9 @@ impl Stops for Traverse {
     }
     fn is_odometry_alone(&self, step: usize) -> bool {
         self.index().stops[step].odometry_alone
+    }
+    fn mast_target(&self, step: usize) -> Option<Designation> {
+        self.index().stops[step].mast_target
     }
     fn pointing_error_deg(&self) -> f64 {
         self.index().pointing_error_deg

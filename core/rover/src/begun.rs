@@ -37,6 +37,11 @@ impl Begun<'_> {
         self.unseen(StepKind::OdometryAlone { predict: self.predict.clone() })
     }
 
+    /// The step of a stop at which the mast is pointed at another target, and this one is out of view.
+    pub(crate) fn out_of_view(&self) -> StepTrace {
+        self.unseen(StepKind::OutOfView { predict: self.predict.clone() })
+    }
+
     /// The step of a stop whose images cannot be had.
     pub(crate) fn damaged(&self, fault: String) -> StepTrace {
         self.unseen(StepKind::Damaged { predict: self.predict.clone(), fault })

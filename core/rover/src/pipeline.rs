@@ -12,7 +12,7 @@ use std::borrow::Cow;
 use sightline_geometry::camera::{Camera, CameraName, Mast, MastAngles};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
-use sightline_geometry::frames::{Pixel, Pose};
+use sightline_geometry::frames::{Pixel, Point3, Pose};
 use sightline_geometry::odometry_error::OdometryError;
 use sightline_geometry::stereo_geometry::StereoGeometry;
 use sightline_track::cycle_stage::CycleStage;
@@ -30,6 +30,9 @@ use sightline_track::trace::{StepKind, StepTrace};
 use crate::begun::Begun;
 use crate::pair::{self, FurtherCamera, FurtherImages, StopPair};
 use crate::visual_odometry::{MeasuredMotion, pose_change_error};
+
+/// A target nearer to the border of an image than this part of its width is out of view: its search window would reach beyond.
+const VIEW_MARGIN: f64 = 1.0 / 16.0;
 
 /// The stops of a drive, as the stages see them.
 pub trait Stops {
@@ -54,6 +57,10 @@ pub trait Stops {
     /// Whether visual odometry runs alone at a stop of a drive: the tracker does not look for its target there.
     fn is_odometry_alone(&self, _step: usize) -> bool {
         false
+    }
+    /// The target at which the mast was pointed at a stop; `None` where it was pointed at none, or nobody knows.
+    fn mast_target(&self, _step: usize) -> Option<Designation> {
+        None
     }
     /// 1σ error of each mast angle, deg; 0 where it is not known.
     fn pointing_error_deg(&self) -> f64;
@@ -235,6 +242,10 @@ fn computed_step(
     if stops.is_odometry_alone(step) {
         return begun.odometry_alone();
     }
+    let looks_elsewhere = stops.mast_target(step).is_some_and(|other| other != target.designation);
+    if looks_elsewhere && pair.as_ref().is_ok_and(|pair| !is_in_view(pair, &prediction.position_in_rover)) {
+        return begun.out_of_view();
+    }
     let images = |pair| pair::capture(stops, step, camera, cancel).map(|images| (pair, images));
     let (pair, images) = match pair.and_then(|pair| images(pair).map_err(|error| error.to_string())) {
         Ok(captured) => captured,
@@ -269,6 +280,18 @@ fn computed_step(
     changes.end(CycleStage::Update);
     let kind = StepKind::Tracked { predict: prediction, capture, locate, judge };
     StepTrace { step, time_s, point_mast: pointing, kind, update }
+}
+
+/// Whether both cameras of a pair show a point of the rover frame, and some ground around it.
+fn is_in_view(pair: &StopPair<'_>, point_in_rover: &Point3) -> bool {
+    [pair.left, pair.right].into_iter().all(|camera| {
+        let [width, height] = camera.size.map(f64::from);
+        let margin_px = VIEW_MARGIN * width;
+        camera.project(point_in_rover).is_some_and(|pixel| {
+            (margin_px..width - margin_px).contains(&pixel.x)
+                && (margin_px..height - margin_px).contains(&pixel.y)
+        })
+    })
 }
 
 /// Where the target should be at the next stop, perhaps displaced to a pixel of the left camera of its pair.

@@ -1,7 +1,6 @@
-//! A targeted drive with its comparison against the truth: the loop of `sightline_rover::driving`, one stop at a time.
+//! The targeted drive of a session with its comparison against the truth: who drives, the decisions, the outcome.
 //!
-//! Page, REST and command line drive through [`TargetedDrive`], so that they show the same numbers. The loop itself sees
-//! estimates alone: leaving the comparison out changes no bit of it.
+//! The loop of `sightline_rover::driving` sees estimates alone: leaving the comparison out changes no bit of it.
 
 use std::sync::Arc;
 
@@ -12,17 +11,15 @@ use crate::Run;
 use crate::pause::{self, Halt, StagePause};
 use crate::step::RunStep;
 use crate::stop_cause::{Explained, StopExplanation};
-use crate::track;
+use crate::visits::Visit;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Vector3;
-use sightline_recordings::{DrivenTraverse, Traverse};
+use sightline_recordings::{DrivenTraverse, Followed, Traverse};
 use sightline_rover::driving::executive::{self, CycleInput};
 use sightline_rover::driving::map_hazards::hazard_camera;
 use sightline_rover::driving::set_goal::goal_position_m;
-use sightline_rover::driving::{Cycle, DriveCommand, Ending, HazardMaps, StopReason};
-use sightline_track::settings::Settings;
-use sightline_track::target::Designation;
+use sightline_rover::driving::{Cycle, DriveCommand, HazardMaps, StopReason};
 use sightline_track::trace::StepTrace;
 use sightline_world::World;
 use sightline_world::target_truth::{TargetTruth, TruthSource};
@@ -38,6 +35,9 @@ pub struct Steering {
     /// The command.
     #[serde(default)]
     pub command: DriveCommand,
+    /// The targets to which the rover drives afterwards, in this order, by their numbers; each with its newest run.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub then: Vec<usize>,
     /// The stop at which the rover waits; null: it drives on. A later stop counts if the rover has left this one already.
     #[serde(default)]
     pub pause_at: Option<usize>,
@@ -53,7 +53,10 @@ pub struct DriveView {
     pub steering: Option<Steering>,
     /// The decisions at the stops that the run has come to, made on its own estimates.
     pub cycles: Vec<Cycle>,
-    /// The outcome so far; null before the first command.
+    /// The visits that have ended, of a drive to several targets.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub visits: Vec<Visit>,
+    /// The outcome so far, for the present target; null before the first command.
     pub summary: Option<DriveSummary>,
     /// Why the drive stopped; null while it goes on, and where it has arrived.
     #[serde(default)]
@@ -81,22 +84,9 @@ impl DriveView {
         let halted = || pause::halted(steering, &run.steps, world.traverse().stop_count());
         let paused = goes_on.then(halted).flatten();
         let why = explained.of(world.traverse(), &steering.command, run.whole_steps(), &cycles, maps);
-        Self { steering: Some(steering.clone()), cycles, summary: Some(summary), why, is_driving, paused }
+        let (steering, summary) = (Some(steering.clone()), Some(summary));
+        Self { steering, cycles, visits: Vec::new(), summary, why, is_driving, paused }
     }
-}
-
-/// A drive towards one target.
-pub struct TargetedDrive {
-    /// The world, at the stop of the last step.
-    pub world: DrivenTraverse,
-    /// The command.
-    pub command: DriveCommand,
-    /// The steps so far; the first is the designation.
-    pub steps: Vec<Arc<RunStep>>,
-    /// The decisions at the stops of the steps, one fewer than there are steps until the drive has ended.
-    pub cycles: Vec<Cycle>,
-    /// The hazard maps of the stops so far.
-    pub maps: HazardMaps,
 }
 
 /// The outcome of a drive.
@@ -122,91 +112,6 @@ pub struct DriveSummary {
     pub flight_minutes: f64,
 }
 
-impl TargetedDrive {
-    /// Designates the target at the first stop and takes the command.
-    ///
-    /// # Errors
-    /// A pixel without a 3-D position, a command that makes no sense for the target, or [`Error::Cancelled`].
-    pub fn begin(
-        world: DrivenTraverse,
-        designation: Designation,
-        command: DriveCommand,
-        settings: &Settings,
-        cancel: Cancel<'_>,
-    ) -> Result<Self> {
-        command.validate()?;
-        let last = world.traverse().stop_count() - 1;
-        if designation.step != last {
-            let problem = format!(
-                "step {} is not the stop at which the rover stands, which is {last}",
-                designation.step
-            );
-            return Err(Error::Target(problem));
-        }
-        let first = track::designate_until(world.traverse(), designation, settings, cancel)?;
-        check_command(world.traverse(), &command, &first.trace)?;
-        Ok(Self {
-            world,
-            command,
-            steps: vec![Arc::new(first)],
-            cycles: Vec::new(),
-            maps: HazardMaps::default(),
-        })
-    }
-
-    /// The end of the drive; `None` while it goes on.
-    pub fn ending(&self) -> Option<Ending> {
-        self.cycles.last()?.ending.clone()
-    }
-
-    /// Decides at the last stop and drives to the next, where the target is found; false once the drive has ended.
-    ///
-    /// # Errors
-    /// [`Error::Cancelled`], or ground that cannot be driven on; the drive is then as it was before.
-    pub fn advance(&mut self, settings: &Settings, cancel: Cancel<'_>) -> Result<bool> {
-        if self.ending().is_some() {
-            return Ok(false);
-        }
-        let (Some(first), Some(last)) = (self.steps.first().cloned(), self.steps.last().cloned()) else {
-            return Ok(false);
-        };
-        let hazards =
-            self.maps.at(self.world.traverse(), &self.command, [&first.trace, &last.trace], cancel)?;
-        let input = CycleInput {
-            command: &self.command,
-            navigator: &*self.command.navigator.navigator(),
-            first: &first.trace,
-            last: &last.trace,
-            before: self.cycles.last(),
-            hazards: hazards.as_deref(),
-        };
-        let before = self.world.state().to_vec();
-        let (cycle, trace) = match executive::advance(&mut self.world, &input, settings, cancel) {
-            Ok(advanced) => advanced,
-            Err(error) => {
-                self.world.restore(before)?;
-                return Err(error);
-            }
-        };
-        self.cycles.push(cycle);
-        let Some(trace) = trace else { return Ok(false) };
-        let step = track::compared(self.world.traverse(), trace, Some(&first.trace));
-        self.steps.push(Arc::new(step));
-        Ok(true)
-    }
-
-    /// The outcome so far.
-    pub fn summary(&self) -> DriveSummary {
-        summary(&self.world, &self.command, &self.steps, &self.cycles)
-    }
-
-    /// Why the drive stopped; `None` while it goes on, and where it has arrived.
-    pub fn why(&mut self) -> Option<StopExplanation> {
-        let (traverse, maps) = (self.world.traverse(), &mut self.maps);
-        Explained::default().of(traverse, &self.command, &self.steps, &self.cycles, maps)
-    }
-}
-
 /// Refuses a command that makes no sense for a target where it was designated.
 ///
 /// # Errors
@@ -216,7 +121,13 @@ pub(crate) fn check_command(traverse: &Traverse, command: &DriveCommand, first: 
     let target = &first.update.target;
     command.validate_for(&target.position_in_rover)?;
     hazard_camera(traverse, first.step, command)?;
-    let pose = traverse.site_from_rover(first.step);
+    let since = command.since.unwrap_or(first.step);
+    if !(first.step..traverse.stop_count()).contains(&since) {
+        let problem = format!("{since} is no stop between the designation, {}, and the last one", first.step);
+        return Err(Error::setting("since", problem));
+    }
+    let target_in_site = traverse.site_from_rover(first.step) * target.position_in_rover;
+    let pose = traverse.site_from_rover(since);
     let tilt_deg = (pose.rotation * Vector3::z()).z.clamp(-1.0, 1.0).acos().to_degrees();
     if tilt_deg > command.tilt_max_deg {
         let limit_deg = command.tilt_max_deg;
@@ -225,7 +136,7 @@ pub(crate) fn check_command(traverse: &Traverse, command: &DriveCommand, first: 
         return Err(Error::setting("tilt_max_deg", problem));
     }
     let start = pose.translation.vector;
-    let goal_m = goal_position_m(command, &(pose * target.position_in_rover), [start.x, start.y]);
+    let goal_m = goal_position_m(command, &target_in_site, [start.x, start.y]);
     let Some(ground_m) = traverse.world().map(World::ground_extent_m) else { return Ok(()) };
     if (0..2).all(|axis| (ground_m[axis][0]..=ground_m[axis][1]).contains(&goal_m[axis])) {
         return Ok(());
@@ -255,7 +166,11 @@ fn cycles(
     let navigator = &*command.navigator.navigator();
     let designation = first.trace.update.target.designation;
     for step in steps {
-        if let Some(followed) = world.followed(step.step).filter(|known| known.designation == designation) {
+        // Before it was sent to this target, the rover drove to others.
+        let is_own = |known: &&Followed| {
+            known.designation == designation || command.since.is_some_and(|since| step.step < since)
+        };
+        if let Some(followed) = world.followed(step.step).filter(is_own) {
             cycles.push(followed.cycle.clone());
             continue;
         }
@@ -319,7 +234,8 @@ fn goal_error_m(world: &DrivenTraverse, command: &DriveCommand, steps: &[Arc<Run
     let traverse = world.traverse();
     let target = &first.update.target;
     let truth = TargetTruth::new(traverse, target.designation, Some(&target.position_in_rover))?;
-    let start = TruthSource::true_site_from_rover(traverse, first.step)?.translation.vector;
+    let since = command.since.unwrap_or(first.step);
+    let start = TruthSource::true_site_from_rover(traverse, since)?.translation.vector;
     let goal_m = goal_position_m(command, &truth.position_in_site(), [start.x, start.y]);
     let rover = TruthSource::true_site_from_rover(traverse, last.step)?.translation.vector;
     Some((rover.x - goal_m[0]).hypot(rover.y - goal_m[1]))

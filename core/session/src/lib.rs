@@ -20,6 +20,8 @@ pub mod records;
 pub mod marks;
 pub mod track;
 pub mod driving;
+pub mod targeted_drive;
+pub mod visits;
 pub mod hazard_view;
 pub mod pause;
 pub mod view;
@@ -98,6 +100,8 @@ pub struct Session {
     pub breakpoints: Breakpoints,
     /// Who drives; `None` where nobody was told to.
     pub steering: Option<Steering>,
+    /// The visits that have ended, of a drive to several targets.
+    pub visits: Vec<visits::Visit>,
     /// The first stage for which the last stop of a paused drive is not ready: `point_mast` or `capture`; `None` if it is ready.
     pub awaits: Option<CycleStage>,
     /// The removed targets that can be restored, the one removed last at the end.
@@ -132,6 +136,7 @@ impl Session {
             cursor,
             breakpoints,
             steering: None,
+            visits: Vec::new(),
             awaits: None,
             removals,
         }

@@ -137,7 +137,7 @@ mod tests {
 
     fn steering(pause_at: Option<usize>, pause: Option<(PauseSide, CycleStage)>) -> Steering {
         let pause = pause.map(|(when, stage)| StagePause { when, stage });
-        Steering { target: 0, run: 0, command: Default::default(), pause_at, pause }
+        Steering { target: 0, run: 0, command: Default::default(), then: Vec::new(), pause_at, pause }
     }
 
     #[test]

@@ -64,8 +64,8 @@ impl Session {
         let targets = saved.targets.iter().enumerate().map(restore).collect::<Result<_>>()?;
         let breakpoints = Breakpoints::restored(&saved.breakpoints);
         let new = Self::new(&saved.id, &saved.traverse, stop_count);
-        let steering = saved.steering.clone();
-        let mut session = Self { targets, breakpoints, steering, ..new };
+        let (steering, visits) = (saved.steering.clone(), saved.visits.clone());
+        let mut session = Self { targets, breakpoints, steering, visits, ..new };
         // Those removed before an earlier end of the program count as removed in the order of their numbers.
         for (number, record) in saved.targets.iter().enumerate() {
             if record.removed && !record.runs.is_empty() {
@@ -144,11 +144,16 @@ impl Session {
     /// # Errors
     /// [`Error::Request`] when there is no such target or run, or its target is not located yet; [`Error::Setting`] for a command
     /// that makes no sense for the target.
-    pub fn steer(&mut self, traverse: &Traverse, steering: Steering) -> Result<()> {
+    pub fn steer(&mut self, traverse: &Traverse, mut steering: Steering) -> Result<()> {
+        self.check_then(steering.target, &steering.then)?;
         let run = self.run(steering.target, steering.run)?;
         let first = run.steps.first().ok_or_else(|| {
             Error::Request("the target is not located yet; wait for the run's first step".to_owned())
         })?;
+        // A changed command for the present target approaches it from the same place.
+        if let Some(present) = self.steering.as_ref().filter(|present| present.target == steering.target) {
+            steering.command.since = steering.command.since.or(present.command.since);
+        }
         check_command(traverse, &steering.command, &first.trace)?;
         if steering.pause.is_some() && steering.pause_at.is_none() {
             let problem = "a pause before or after a stage needs the stop, in `pause_at`";
@@ -266,6 +271,7 @@ mod tests {
             }],
             breakpoints: vec![Breakpoint { number: 4, expression: "ncc < 0.6".to_owned(), on: false }],
             steering: None,
+            visits: Vec::new(),
         }
     }
 

@@ -82,6 +82,7 @@ impl RunStep {
             budget_without_m: budget.map(|budget| budget.without_tracking_m),
             budget_with_m: budget.map(|budget| budget.with_tracking_m),
             fault: self.fault().is_some(),
+            not_searched: self.why_not_searched().is_some(),
             lost_count: match self.update.state {
                 TrackingState::Lost { count } => Some(count),
                 _ => None,

@@ -11,8 +11,9 @@ use sightline_track::target::TrackingState;
 pub struct Summary {
     /// Steps run, the designation included.
     pub steps: usize,
-    /// Steps at which visual odometry ran alone: the tracker did not look for the target.
-    pub steps_odometry_alone: usize,
+    /// Steps at which the tracker did not look for the target: visual odometry ran alone, or the mast was pointed at another target
+    /// and this one was out of view.
+    pub steps_not_searched: usize,
     /// Steps that were tracked; null without truth.
     pub steps_tracked: Option<usize>,
     /// Steps in state `lost` or `failed`.
@@ -34,8 +35,8 @@ pub fn summarise<'a>(steps: impl IntoIterator<Item = &'a RunStep>) -> Summary {
     let mut summary = Summary::default();
     for step in steps {
         summary.steps += 1;
-        if step.is_odometry_alone() {
-            summary.steps_odometry_alone += 1;
+        if step.why_not_searched().is_some() {
+            summary.steps_not_searched += 1;
             continue;
         }
         summary.steps_lost += usize::from(step.update.state.is_lost());

@@ -10,6 +10,7 @@ use super::{Cursor, Fork, Run, Session, TargetRecord};
 use crate::driving::Steering;
 use crate::step::StepRow;
 use crate::summary::{Summary, summarise};
+use crate::visits::Visit;
 use sightline_track::settings::{Changes, Settings};
 use sightline_track::target::Designation;
 
@@ -103,6 +104,9 @@ pub struct SavedSession {
     /// Who drove, and how.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub steering: Option<Steering>,
+    /// The visits that had ended, of a drive to several targets.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub visits: Vec<Visit>,
 }
 
 /// A target as it was designated, and the configurations tried on it.
@@ -203,6 +207,7 @@ impl Session {
                 .collect(),
             breakpoints: self.breakpoints.list(),
             steering: self.steering.clone(),
+            visits: self.visits.clone(),
         }
     }
 

@@ -271,7 +271,7 @@ fn add(sum: &mut Summary, part: &Summary) {
     };
     sum.steps += part.steps;
     sum.steps_lost += part.steps_lost;
-    sum.steps_odometry_alone += part.steps_odometry_alone;
+    sum.steps_not_searched += part.steps_not_searched;
     sum.steps_tracked = more(sum.steps_tracked, part.steps_tracked);
     sum.false_tracked = more(sum.false_tracked, part.false_tracked);
     sum.false_lost = more(sum.false_lost, part.false_lost);

@@ -10,8 +10,8 @@ use sightline_recordings::{DrivenTraverse, Existing, IndexFormat, Traverse, crea
 use sightline_rover::designate::Place;
 use sightline_rover::driving::DriveCommand;
 use sightline_rover::visual_odometry::OdometryMode;
-use sightline_session::driving::TargetedDrive;
 use sightline_session::step::RunStep;
+use sightline_session::targeted_drive::TargetedDrive;
 use sightline_session::track;
 use sightline_track::presets::preset;
 use sightline_track::settings::Settings;

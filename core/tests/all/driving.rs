@@ -12,8 +12,8 @@ use sightline_rover::driving::{
     ArcNavigator, ArrivalAction, DriveCommand, GoalRule, OdometryPair, StopReason,
 };
 use sightline_rover::pipeline;
-use sightline_session::driving::TargetedDrive;
 use sightline_session::replayed_drive::ReplayedDrive;
+use sightline_session::targeted_drive::TargetedDrive;
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
 use sightline_world::rover::driven::DrivenStop;

@@ -12,7 +12,7 @@ use sightline_rover::driving::{
     Cycle, DriveCommand, GoalRule, NavigatorKind, PathChoice, RangeData, StopHazards, StopReason,
 };
 use sightline_rover::hazards::CellBasis;
-use sightline_session::driving::TargetedDrive;
+use sightline_session::targeted_drive::TargetedDrive;
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
 use sightline_world::{Scenario, choose_targets, library};

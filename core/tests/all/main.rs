@@ -18,6 +18,7 @@ mod driving_odometry;
 mod terrain_odometry;
 mod stage_pause;
 mod stop_causes;
+mod visits;
 mod registration;
 mod stereo_rendered;
 mod stereo_recorded;

@@ -4,7 +4,7 @@ use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::Pose;
 use sightline_recordings::DrivenTraverse;
 use sightline_rover::driving::DriveCommand;
-use sightline_session::driving::TargetedDrive;
+use sightline_session::targeted_drive::TargetedDrive;
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
 use sightline_world::rover::driven::DrivenStop;

@@ -63,6 +63,12 @@ pub enum StepKind {
         /// Stage 1.
         predict: Prediction,
     },
+    /// A later stop of a drive at which the mast is pointed at another target, and this one is out of view: it is carried by the
+    /// prediction.
+    OutOfView {
+        /// Stage 1.
+        predict: Prediction,
+    },
     /// A later stop whose files are damaged, or that lacks the target's pair: the target is carried by the prediction.
     Damaged {
         /// Stage 1.
@@ -88,7 +94,11 @@ pub enum StepKind {
 }
 
 /// Why a stop for odometry alone has no match.
-pub const ODOMETRY_ALONE: &str = "visual odometry ran alone, and the position is the prediction";
+const ODOMETRY_ALONE: &str = "visual odometry ran alone, and the position is the prediction";
+
+/// Why a stop at which the mast is pointed at another target has no match.
+const OUT_OF_VIEW: &str =
+    "the mast is pointed at another target and this one is out of view; the position is the prediction";
 
 impl StepTrace {
     /// Stage 1; `None` at the designation.
@@ -97,6 +107,7 @@ impl StepTrace {
             StepKind::Designation { .. } => None,
             StepKind::Tracked { predict, .. }
             | StepKind::OdometryAlone { predict }
+            | StepKind::OutOfView { predict }
             | StepKind::Damaged { predict, .. }
             | StepKind::Begun { predict, .. } => Some(predict),
         }
@@ -119,6 +130,20 @@ impl StepTrace {
         matches!(self.kind, StepKind::OdometryAlone { .. })
     }
 
+    /// Whether the mast is pointed at another target and this one is out of view.
+    pub const fn is_out_of_view(&self) -> bool {
+        matches!(self.kind, StepKind::OutOfView { .. })
+    }
+
+    /// Why the tracker did not look for the target, which is no failure; `None` where it did.
+    pub const fn why_not_searched(&self) -> Option<&'static str> {
+        match self.kind {
+            StepKind::OdometryAlone { .. } => Some(ODOMETRY_ALONE),
+            StepKind::OutOfView { .. } => Some(OUT_OF_VIEW),
+            _ => None,
+        }
+    }
+
     /// Whether a step of a paused drive lacks stages.
     pub const fn is_begun(&self) -> bool {
         matches!(self.kind, StepKind::Begun { .. })
@@ -137,12 +162,12 @@ impl StepTrace {
         if self.is_begun() { None } else { Some(&self.update) }
     }
 
-    /// Stage 3; `None` where the stop's files are damaged, odometry runs alone, or the drive is paused before it.
+    /// Stage 3; `None` where the stop's files are damaged, nothing was searched, or the drive is paused before it.
     pub const fn capture(&self) -> Option<&Capture> {
         match &self.kind {
             StepKind::Designation { capture, .. } | StepKind::Tracked { capture, .. } => Some(capture),
             StepKind::Begun { capture, .. } => capture.as_ref(),
-            StepKind::OdometryAlone { .. } | StepKind::Damaged { .. } => None,
+            StepKind::OdometryAlone { .. } | StepKind::OutOfView { .. } | StepKind::Damaged { .. } => None,
         }
     }
 
@@ -151,16 +176,16 @@ impl StepTrace {
         match &mut self.kind {
             StepKind::Designation { capture, .. } | StepKind::Tracked { capture, .. } => Some(capture),
             StepKind::Begun { capture, .. } => capture.as_mut(),
-            StepKind::OdometryAlone { .. } | StepKind::Damaged { .. } => None,
+            StepKind::OdometryAlone { .. } | StepKind::OutOfView { .. } | StepKind::Damaged { .. } => None,
         }
     }
 
-    /// Stage 4; `None` where the stop's files are damaged, odometry runs alone, or the drive is paused before it.
+    /// Stage 4; `None` where the stop's files are damaged, nothing was searched, or the drive is paused before it.
     pub const fn located(&self) -> Option<&Located> {
         match &self.kind {
             StepKind::Designation { locate, .. } | StepKind::Tracked { locate, .. } => Some(locate),
             StepKind::Begun { locate, .. } => locate.as_ref(),
-            StepKind::OdometryAlone { .. } | StepKind::Damaged { .. } => None,
+            StepKind::OdometryAlone { .. } | StepKind::OutOfView { .. } | StepKind::Damaged { .. } => None,
         }
     }
 
@@ -169,7 +194,7 @@ impl StepTrace {
         match &mut self.kind {
             StepKind::Designation { locate, .. } | StepKind::Tracked { locate, .. } => Some(locate),
             StepKind::Begun { locate, .. } => locate.as_mut(),
-            StepKind::OdometryAlone { .. } | StepKind::Damaged { .. } => None,
+            StepKind::OdometryAlone { .. } | StepKind::OutOfView { .. } | StepKind::Damaged { .. } => None,
         }
     }
 
@@ -178,7 +203,10 @@ impl StepTrace {
         match &self.kind {
             StepKind::Tracked { judge, .. } => Some(judge),
             StepKind::Begun { judge, .. } => judge.as_ref(),
-            StepKind::Designation { .. } | StepKind::OdometryAlone { .. } | StepKind::Damaged { .. } => None,
+            StepKind::Designation { .. }
+            | StepKind::OdometryAlone { .. }
+            | StepKind::OutOfView { .. }
+            | StepKind::Damaged { .. } => None,
         }
     }
 
@@ -190,13 +218,13 @@ impl StepTrace {
         }
     }
 
-    /// Why the step lacks stages: the damage of the stop's files, the pause of the drive, or a stop for odometry alone; `None`
-    /// for a complete step.
+    /// Why the step lacks stages: the damage of the stop's files, the pause of the drive, or a stop at which nothing was searched;
+    /// `None` for a complete step.
     pub fn why_incomplete(&self) -> Option<String> {
         let paused =
             |before: CycleStage| format!("not computed yet: the drive is paused before `{}`", before.word());
-        let alone = || self.is_odometry_alone().then(|| ODOMETRY_ALONE.to_owned());
-        self.fault().map(str::to_owned).or_else(|| self.paused_before().map(paused)).or_else(alone)
+        let not_searched = self.why_not_searched().map(str::to_owned);
+        self.fault().map(str::to_owned).or_else(|| self.paused_before().map(paused)).or(not_searched)
     }
 
     /// The evidence of the template locator, where something was located.

@@ -123,6 +123,7 @@ pub(crate) fn simulated_stop(
         metered_px: None,
         odometry: None,
         odometry_alone: false,
+        mast_target: None,
         truth: Some(StopTruth { site_from_rover: truth, left_camera, right_camera, wheel_places_m: None }),
         cameras: rigs.further.iter().map(further).collect(),
     }
@@ -186,6 +187,7 @@ fn handed_over(last: &Stop, number: usize, settings: &CameraSettings) -> Option<
         metered_px: None,
         odometry: None,
         odometry_alone: false,
+        mast_target: None,
         truth: Some(StopTruth {
             site_from_rover: truth.site_from_rover,
             left_camera: None,

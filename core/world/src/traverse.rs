@@ -12,6 +12,7 @@ use sightline_geometry::frames::{Pixel, PoseRecord, Vector3};
 use sightline_geometry::odometry_error::OdometryError;
 use sightline_geometry::stereo_geometry::StereoGeometry;
 use sightline_rover::visual_odometry::MeasuredMotion;
+use sightline_track::target::Designation;
 
 /// The version of the folder format that this code writes.
 pub const FORMAT_VERSION: u32 = 1;
@@ -69,6 +70,9 @@ pub struct Stop {
     /// Whether visual odometry ran alone here: no tracker looks for its target at this stop.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub odometry_alone: bool,
+    /// The target at which a drive pointed the mast; left out where it was pointed at none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mast_target: Option<Designation>,
     /// The mast angles at which the pair was taken, where there is a mast.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mast_angles: Option<MastAngles>,

@@ -20,10 +20,12 @@ use sightline_rover::driving::{
     TrackedStops,
 };
 use sightline_rover::visual_odometry::OdometryMode;
-use sightline_session::driving::{DriveSummary, TargetedDrive};
+use sightline_session::driving::DriveSummary;
 use sightline_session::replayed_drive::{ReplaySummary, ReplayedDrive};
 use sightline_session::step::RunStep;
 use sightline_session::stop_cause::StopExplanation;
+use sightline_session::targeted_drive::TargetedDrive;
+use sightline_session::visits::Visit;
 use sightline_track::presets::preset;
 use sightline_track::settings::{Changes, Settings, parse_assignment};
 use sightline_track::target::Designation;
@@ -41,10 +43,10 @@ pub(super) struct Drive {
     /// The scenario: a file, or a name that `sightline scenarios` lists. With the folder of a recording the rover goes where it
     /// was recorded, and every line compares the command with the recorded step.
     scenario: PathBuf,
-    /// The position of the target in the first left image, px.
+    /// The position of the target in the first left image, px; with several, the rover drives to one after the other.
     #[arg(long, value_name = "X,Y", value_parser = pixel, allow_hyphen_values = true,
         required_unless_present = "list_targets")]
-    target: Option<Pixel>,
+    target: Vec<Pixel>,
     /// The pair in which the target is designated and tracked, by its name in camera.further; by default the main pair, for
     /// which the mast is pointed in any case.
     #[arg(long, value_name = "NAME")]
@@ -214,6 +216,9 @@ enum Format {
 /// The line of a stop.
 #[derive(Serialize)]
 struct StopLine<'a> {
+    /// The number of the target that the rover drives to, from 0; absent with one target.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    target: Option<usize>,
     #[serde(flatten)]
     row: Row,
     /// Number of paths that are vetoed; absent without a hazard map.
@@ -249,6 +254,10 @@ struct TargetLine {
 /// The line after the last stop.
 #[derive(Serialize)]
 struct SummaryLine {
+    /// The visits of a drive to several targets.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    visits: Vec<Visit>,
+    /// The outcome, for the last target.
     summary: DriveSummary,
     /// Why the drive stopped; absent where it has arrived.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -284,10 +293,9 @@ impl Drive {
             }
             return targets.iter().try_for_each(|pixel| line(&TargetLine { target: [pixel.x, pixel.y] }));
         }
-        // The command line refuses to come here without one.
-        let Some(pixel) = self.target else { return Ok(()) };
-        let designation = Designation { step: 0, pixel, camera: self.camera };
-        let drive = TargetedDrive::begin(world, designation, self.command(), &settings, Cancel::default())?;
+        let designated = |pixel: &Pixel| Designation { step: 0, pixel: *pixel, camera: self.camera };
+        let targets: Vec<Designation> = self.target.iter().map(designated).collect();
+        let drive = TargetedDrive::begin_to(world, &targets, self.command(), &settings, Cancel::default())?;
         follow(drive, &settings)
     }
 
@@ -305,7 +313,10 @@ impl Drive {
         }
         let settings = self.settings()?;
         let traverse = Traverse::open(&self.scenario)?;
-        let Some(pixel) = self.target else { return Ok(()) };
+        let [pixel] = self.target[..] else {
+            let problem = "--target: a recording is followed with one target; give it once";
+            return Err(Error::Request(problem.to_owned()));
+        };
         let designation = Designation { step: 0, pixel, camera: self.camera };
         let cancel = Cancel::default();
         let mut drive = ReplayedDrive::begin(&traverse, designation, self.command(), &settings, cancel)?;
@@ -374,14 +385,20 @@ impl Drive {
 /// Drives to the end, one line a stop.
 fn follow(mut drive: TargetedDrive, settings: &Settings) -> Result<()> {
     let mut progress = Progress::new("drove to stop");
+    let has_several = drive.has_several_targets();
     loop {
         let goes_on = drive.advance(settings, Cancel::default())?;
         let number = drive.cycles.len() - 1;
         let (step, cycle): (&RunStep, &Cycle) = (&drive.steps[number], &drive.cycles[number]);
-        line(&StopLine { row: step.into(), vetoed_paths: vetoed_paths(cycle), cycle })?;
+        let target = has_several.then_some(drive.target);
+        line(&StopLine { target, row: step.into(), vetoed_paths: vetoed_paths(cycle), cycle })?;
         progress.tell(number + 1, drive.command.stops_max as usize);
         if !goes_on {
-            return line(&SummaryLine { summary: drive.summary(), why: drive.why() });
+            let (summary, why) = (drive.summary(), drive.why());
+            if drive.visit_next() {
+                continue;
+            }
+            return line(&SummaryLine { visits: drive.visits, summary, why });
         }
         // The images of stops that were left behind are not needed any more.
         drive.steps[number] = Arc::new(without_images(&drive.steps[number]));

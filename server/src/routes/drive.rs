@@ -17,6 +17,7 @@ use sightline_recordings::DrivenTraverse;
 use sightline_session::driving::{DriveView, Steering};
 use sightline_session::hazard_view::HazardView;
 use sightline_session::view::{SavedSession, SavedTarget, SessionView};
+use sightline_session::visits::Visit;
 use sightline_session::{Cursor, Fork, Session};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
@@ -122,7 +123,8 @@ fn add(
     cancel: &CancelFlag,
 ) -> ApiResult<Arc<LiveSession>> {
     let command = new.command.clone();
-    let steering = Steering { target, run, command, pause_at: new.pause_at, pause: new.pause };
+    let then = new.then.clone();
+    let steering = Steering { target, run, command, then, pause_at: new.pause_at, pause: new.pause };
     let open = live.traverse();
     let (saved, last) = live.with(|session| {
         let steps = &session.run(target, run).map_err(|error| ApiError::from(error).about_path())?.steps;
@@ -132,6 +134,16 @@ fn add(
     })?;
     let designated = saved.targets[target].designation.step;
     let from_step = from_step(&open, new, designated, last)?;
+    for (index, later) in new.then.iter().enumerate() {
+        let designated = saved.targets[*later].designation.step;
+        if designated > from_step {
+            let problem = format!(
+                "then[{index}]: target {later} is designated at stop {designated}, later than stop {from_step}, from which is driven"
+            );
+            return Err(ApiError::invalid("field", problem)
+                .hint("Designate it at that stop or an earlier one, or leave it out."));
+        }
+    }
     let folder = driven::new_folder(state.folders(), &open.traverse.index().name)?;
     let made = world(&open, from_step, &folder, cancel).and_then(|world| {
         state.limits().check_drive(world.traverse())?;
@@ -185,13 +197,26 @@ fn world(
     Ok(DrivenTraverse::begin(&scenario, folder, cancel.as_ref().into())?)
 }
 
-/// What the session of the drive begins with: the target with its runs.
+/// What the session of the drive begins with: its targets with their runs, the first one first. The visits that had ended up to
+/// the stop from which is driven are those of the drive, too.
 fn session_of(saved: SavedSession, steering: Steering, from_step: usize) -> SavedSession {
     let Steering { target, run, .. } = steering;
-    let targets = saved.targets.into_iter().skip(target).take(1);
+    let visits = saved.visits.into_iter().filter(|visit| visit.until <= from_step);
+    let mut visits: Vec<Visit> = visits.collect();
+    let mut numbers = vec![target];
+    for number in steering.then.iter().copied().chain(visits.iter().map(|visit| visit.target)) {
+        if !numbers.contains(&number) {
+            numbers.push(number);
+        }
+    }
+    let renumbered = |number: usize| numbers.iter().position(|known| *known == number).unwrap_or(0);
+    visits.iter_mut().for_each(|visit| visit.target = renumbered(visit.target));
+    let then = steering.then.iter().map(|number| renumbered(*number)).collect();
+    let targets = numbers.iter().filter_map(|number| saved.targets.get(*number).cloned());
     let mut targets: Vec<SavedTarget> = targets.collect();
     // A run that was stopped drives on.
-    targets.iter_mut().filter_map(|target| target.runs.get_mut(run)).for_each(|run| run.stop_after = None);
+    let drivers = targets.first_mut().and_then(|target| target.runs.get_mut(run));
+    drivers.into_iter().for_each(|run| run.stop_after = None);
     // The new drive lacks the later stops: what was changed there is changed from here on.
     let forks = targets.iter_mut().flat_map(|target| &mut target.runs).filter_map(|run| run.fork.as_mut());
     for fork in forks.filter(|fork| fork.from_step > from_step) {
@@ -200,7 +225,8 @@ fn session_of(saved: SavedSession, steering: Steering, from_step: usize) -> Save
     SavedSession {
         cursor: Cursor { target: Some(0), run, step: from_step },
         targets,
-        steering: Some(Steering { target: 0, ..steering }),
+        steering: Some(Steering { target: 0, then, ..steering }),
+        visits,
         ..saved
     }
 }

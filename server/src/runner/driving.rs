@@ -3,14 +3,16 @@
 use std::sync::Arc;
 
 use sightline_api::event::Event;
-use sightline_geometry::error::Result;
+use sightline_geometry::error::{Error, Result};
+use sightline_rover::driving::Ending;
+use sightline_session::Session;
 use sightline_session::driving::Steering;
 use sightline_session::step::RunStep;
 use sightline_track::cycle_stage::CycleStage;
 
 use super::{Runner, every_run, progress};
 use crate::cancel::CancelFlag;
-use crate::driven;
+use crate::driven::{self, DrivenOn};
 use crate::jobs::lock;
 use crate::live_session::LiveSession;
 use crate::rendering::OpenTraverse;
@@ -27,12 +29,39 @@ impl Runner {
         let open = live.traverse();
         let count = open.traverse.stop_count();
         self.tell(progress(live, steering.target, steering.run, format!("driving to stop {count}")));
-        let Some(grown) = driven::drive_on(&open, steering, steps, flag)? else {
-            // Somebody else may have driven on, and then there is a step to compute.
-            return Ok(live.traverse().traverse.stop_count() > count);
-        };
-        self.put_in_place(&grown, (live, (steering.target, steering.run)));
-        Ok(true)
+        match driven::drive_on(&open, steering, steps, flag)? {
+            DrivenOn::Grown(grown) => {
+                self.put_in_place(&grown, (live, (steering.target, steering.run)));
+                Ok(true)
+            }
+            DrivenOn::Ended(ending) => {
+                self.visit_next(live, &ending)?;
+                Ok(false)
+            }
+            // Then there is a step to compute.
+            DrivenOn::Overtaken => Ok(live.traverse().traverse.stop_count() > count),
+        }
+    }
+
+    /// Notes how the drive to a target ended, and lets the run of the next one drive.
+    fn visit_next(&self, live: &LiveSession, ending: &Ending) -> Result<()> {
+        let open = live.traverse();
+        let Some(driven) = &open.driven else { return Ok(()) };
+        let visit = |session: &mut Session| driven.with(|world| Ok(session.visit_next(world, ending)?));
+        let next = live.change_and(&self.store, visit, |_| ());
+        let next = next.map_err(|problem| Error::Request(problem.problem().detail.clone()))?;
+        let session = self.session_of(live);
+        if let (Some((target, run)), Some(session)) = (next, session) {
+            // A run that finds no place in the queue can be resumed by hand.
+            let _ = self.start(&session, target, run);
+        }
+        self.tell(Some(Event::SessionChanged { session: live.id.clone() }));
+        Ok(())
+    }
+
+    /// A session as it is shared.
+    fn session_of(&self, live: &LiveSession) -> Option<Arc<LiveSession>> {
+        lock(&self.sessions).by_number.values().find(|other| other.id == live.id).cloned()
     }
 
     /// Does the world's part of the next stages at a stop where the drive was paused; false where nothing is left to do.

@@ -81,6 +81,7 @@ fn stop(step: usize) -> Stop {
         metered_px: None,
         odometry: None,
         odometry_alone: false,
+        mast_target: None,
         truth: None,
         cameras: Vec::new(),
     }

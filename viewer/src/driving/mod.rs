@@ -7,6 +7,7 @@ pub(crate) mod paths;
 pub(crate) mod pause;
 pub(crate) mod stages;
 pub(crate) mod update;
+pub(crate) mod visits;
 pub(crate) mod why;
 pub(crate) mod words;
 
@@ -18,6 +19,8 @@ use sightline_session::driving::DriveView;
 pub struct Driving {
     /// The command as it stands in the form.
     pub command: DriveCommand,
+    /// The targets to which the rover drives afterwards, as they stand in the form, by their numbers.
+    pub then: Vec<usize>,
     /// The pause as it stands in the form.
     pub pause: pause::PauseForm,
     /// The drive with the name of its session; `None` before it was read.
@@ -34,6 +37,8 @@ pub struct Driving {
 pub enum Ask {
     /// Changes the command in the form.
     Form(DriveCommand),
+    /// Changes the targets that are visited afterwards.
+    Then(Vec<usize>),
     /// Begins a drive with the run that is looked at: from the first stop, or as a branch at the cursor's stop.
     Begin,
     /// Changes the pause in the form.

@@ -10,7 +10,7 @@ use sightline_session::pause::PauseSide;
 use sightline_track::cycle_stage::CycleStage;
 
 use crate::command::{Command, Go};
-use crate::driving::{Ask, pause, why, words};
+use crate::driving::{Ask, pause, visits, why, words};
 use crate::panels::digits;
 use crate::panels::panel::Panel;
 use crate::state::{State, run_letter};
@@ -36,11 +36,13 @@ impl Panel for Drive {
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ScrollArea::both().auto_shrink(false).show(ui, |ui| {
         form(ui, state, out);
+        visits::form(ui, state, out);
         match state.drive().filter(|_| state.is_on_commands()) {
             Some(drive) => {
                 pause_form(ui, state, out);
                 buttons(ui, state, drive, out);
                 standing(ui, drive);
+                visits::list(ui, state, drive);
                 if let Some(why) = &drive.why {
                     why::headline(ui, why, out);
                 }
@@ -247,8 +249,9 @@ fn buttons(ui: &mut Ui, state: &State, drive: &DriveView, out: &mut Vec<Command>
     let is_driver = drive.steering.as_ref().is_some_and(|steering| {
         state.cursor.target == Some(steering.target) && state.cursor.run == steering.run
     });
-    let is_other_command =
-        drive.steering.as_ref().is_some_and(|steering| steering.command != state.driving.command);
+    let is_other_command = drive.steering.as_ref().is_some_and(|steering| {
+        steering.command != state.driving.command || steering.then != state.driving.then
+    });
     ui.horizontal_wrapped(|ui| {
         let mut button = |name: &str, is_on: bool, help: &str, ask: Ask| {
             if ui.add_enabled(is_on, Button::new(name)).on_hover_text(help).clicked() {

@@ -82,8 +82,21 @@ impl State {
         if is_other {
             self.driving.following = None;
         }
+        let driver =
+            |view: &DriveView| view.steering.as_ref().map(|steering| (steering.target, steering.run));
+        let is_next = !is_other && self.drive().and_then(driver) != driver(&view);
+        if let Some(steering) = view.steering.as_ref().filter(|_| is_next) {
+            // The rover was sent to the next target: whoever looks at the one that it drove to goes with it.
+            self.driving.command.since = steering.command.since;
+            self.driving.then.clone_from(&steering.then);
+            let looked_at = self.cursor.target.map(|target| (target, self.cursor.run));
+            if looked_at == self.drive().and_then(driver) {
+                (self.cursor.target, self.cursor.run) = (Some(steering.target), steering.run);
+            }
+        }
         if let Some(steering) = view.steering.as_ref().filter(|_| is_other) {
             self.driving.command = steering.command.clone();
+            self.driving.then.clone_from(&steering.then);
             self.driving.pause.pause = steering.pause.unwrap_or_else(|| PauseForm::default().pause);
         }
         let now = newest(&view);
@@ -113,6 +126,7 @@ impl State {
     pub(crate) fn ask_of_driving(&mut self, ask: Ask) {
         match ask {
             Ask::Form(command) => self.driving.command = command,
+            Ask::Then(then) => self.driving.then = then,
             Ask::PauseForm(form) => self.driving.pause = form,
             Ask::Begin => self.begin_drive(),
             Ask::Pause => {
@@ -152,7 +166,9 @@ impl State {
     /// The run that is looked at as the one that drives.
     fn looked_at(&self) -> Option<Steering> {
         let (target, run) = (self.target()?.number, self.run()?.number);
-        Some(Steering { target, run, command: self.driving.command.clone(), pause_at: None, pause: None })
+        let (command, mut then) = (self.driving.command.clone(), self.driving.then.clone());
+        then.retain(|later| *later != target);
+        Some(Steering { target, run, command, then, pause_at: None, pause: None })
     }
 
     fn steer(&mut self, steering: Option<Steering>) {
@@ -174,7 +190,13 @@ impl State {
             return;
         };
         let from_step = self.is_on_commands().then_some(self.cursor.step);
-        let new = NewDrive { command: steering.command, from_step, pause_at: None, pause: None };
+        let new = NewDrive {
+            command: steering.command,
+            then: steering.then,
+            from_step,
+            pause_at: None,
+            pause: None,
+        };
         let at = AtRun { session, target: steering.target, run: steering.run };
         let call = Call::with_body::<BeginDrive>(&at, &new);
         self.driving.is_beginning = true;
@@ -209,8 +231,7 @@ mod tests {
     /// A session that drives with its only run, at a stop.
     fn driving(step: usize) -> State {
         let mut state = fixture::at_step(&egui::Context::default(), step);
-        let steering =
-            Steering { target: 0, run: 0, command: Default::default(), pause_at: None, pause: None };
+        let steering = serde_json::from_value(json!({ "target": 0, "run": 0 })).unwrap();
         if let Some(session) = &mut state.session {
             session.steering = Some(steering);
         }

@@ -14,7 +14,6 @@ use crate::command::table::{
 use crate::command::{Command, Stage};
 use crate::compare::panel::{choosers, readouts};
 use crate::net::events::Connection;
-use crate::panels::timeline::cells;
 use crate::panels::{inspector, messages, numbers, playing, view_menu};
 use crate::state::messages::Weight;
 use crate::state::tracker::confidence_of;
@@ -124,7 +123,7 @@ pub(crate) fn status(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         return;
     };
     let tracking = state.tracking().unwrap_or_default();
-    let is_not_searched = cells::is_not_searched(row);
+    let is_not_searched = row.not_searched;
     let (word, colour) = match tracking {
         _ if is_not_searched => ("NOT SEARCHED".to_owned(), theme::weak()),
         _ if tracking == TrackingState::Tracking && row.tracked == Some(false) => {

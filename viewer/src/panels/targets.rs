@@ -337,13 +337,13 @@ fn summary(run: &RunView) -> String {
     let summary = &run.summary;
     let mut words = Vec::new();
     if let Some(tracked) = summary.steps_tracked {
-        words.push(format!("{tracked} of {} tracked", summary.steps - summary.steps_odometry_alone));
+        words.push(format!("{tracked} of {} tracked", summary.steps - summary.steps_not_searched));
     }
     if summary.steps_lost > 0 {
         words.push(format!("{} lost", summary.steps_lost));
     }
-    if summary.steps_odometry_alone > 0 {
-        words.push(format!("{} not searched", summary.steps_odometry_alone));
+    if summary.steps_not_searched > 0 {
+        words.push(format!("{} not searched", summary.steps_not_searched));
     }
     if let Some(false_tracked) = summary.false_tracked.filter(|&n| n > 0) {
         words.push(format!("{false_tracked} false tracking"));

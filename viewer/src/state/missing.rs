@@ -3,7 +3,6 @@
 use crate::cache::Slot;
 use crate::state::State;
 use sightline_session::driving::DriveView;
-use sightline_track::trace::ODOMETRY_ALONE;
 
 impl State {
     /// Why the panels of a step have nothing to show, as a sentence that says how to get it.
@@ -35,11 +34,11 @@ impl State {
         }
         match self.trace_at(step) {
             Slot::Failed(problem) => format!("Step {step} cannot be shown: {}", problem.detail),
+            Slot::Ready(trace) if let Some(why) = trace.why_not_searched() => {
+                format!("At step {step}, {why}. Step to a tracked stop to see a match.")
+            }
             Slot::Ready(trace) => match (trace.fault(), trace.located()) {
                 (Some(fault), _) => format!("The files of step {step} are at fault: {fault}"),
-                _ if trace.is_odometry_alone() => {
-                    format!("At step {step}, {ODOMETRY_ALONE}. Step to a tracked stop to see a match.")
-                }
                 (None, Some(located)) if located.missing.is_some() => {
                     located.missing.clone().unwrap_or_default()
                 }

@@ -106,6 +106,7 @@ impl ImportFormat for Kitti {
                 metered_px: None,
                 odometry: None,
                 odometry_alone: false,
+                mast_target: None,
                 truth: Some(StopTruth {
                     site_from_rover: PoseRecord::from(truth),
                     left_camera: None,

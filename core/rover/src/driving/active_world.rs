@@ -50,6 +50,13 @@ pub trait ActiveWorld {
     /// A stop that cannot be stored.
     fn leave_to_odometry(&mut self) -> Result<()>;
 
+    /// Keeps at which target the mast of the last stop is pointed: another one that is out of view there is not searched. A
+    /// recording does not know it.
+    ///
+    /// # Errors
+    /// A stop that cannot be stored.
+    fn keep_mast_target(&mut self, target: Designation) -> Result<()>;
+
     /// Points the mast of the last stop; `None` leaves it as it is.
     ///
     /// # Errors

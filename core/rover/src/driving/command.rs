@@ -104,6 +104,10 @@ pub struct DriveCommand {
     pub standoff_m: f64,
     /// Added to the goal, x and y of the site frame, m (0, 0; −20 to 20).
     pub offset_m: [f64; 2],
+    /// The stop at which the rover was sent to this target, from whose place the goal is approached (null: that of the
+    /// designation). A later target of a drive to several has it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub since: Option<usize>,
     /// Whether tracking moves the goal (`follows_target`).
     pub goal: GoalRule,
     /// The rover has arrived when its frame's origin is nearer to the goal than this, horizontally, m (0.05: ours; 0.001 to 1).
@@ -148,6 +152,7 @@ impl Default for DriveCommand {
         Self {
             standoff_m: 2.0,
             offset_m: [0.0; 2],
+            since: None,
             goal: GoalRule::FollowsTarget,
             tolerance_m: 0.05,
             step_fraction: 0.10,
@@ -213,16 +218,20 @@ impl DriveCommand {
 
     /// Whether another command has the same goal for the same target.
     pub fn has_goal_of(&self, other: &Self) -> bool {
-        (self.standoff_m, self.offset_m, self.goal, self.tolerance_m)
-            == (other.standoff_m, other.offset_m, other.goal, other.tolerance_m)
+        let goal = |of: &Self| (of.standoff_m, of.offset_m, of.since, of.goal, of.tolerance_m);
+        goal(self) == goal(other)
     }
 
     /// Refuses a command that makes no sense for a target at this position in the rover frame of the designation.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a target behind the rover or nearer than the standoff.
+    /// [`Error::Setting`] for a target behind the rover or nearer than the standoff, where it is the first one.
     pub fn validate_for(&self, target_in_rover: &Point3) -> Result<()> {
         self.validate()?;
+        if self.since.is_some() {
+            // The rover has moved since the designation.
+            return Ok(());
+        }
         let distance_m = target_in_rover.x.hypot(target_in_rover.y);
         if target_in_rover.x <= 0.0 {
             let problem = format!(

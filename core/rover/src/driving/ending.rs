@@ -57,6 +57,11 @@ pub enum StopReason {
 }
 
 impl StopReason {
+    /// Whether it concerns one target alone: another one can be driven to from there.
+    pub const fn is_of_target(self) -> bool {
+        matches!(self, Self::Arrived | Self::Lost | Self::LimitCycle | Self::NoSafePath | Self::GoalBlocked)
+    }
+
     /// The reason in words.
     pub const fn word(self) -> &'static str {
         match self {
@@ -110,7 +115,7 @@ pub(super) fn ending(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &Cycle) -
     let end = |reason, value: f64, limit: f64| Some(Ending::beyond(reason, value, limit));
     let named = |reason| Some(Ending::named(reason, None));
     // A later look may put the goal a little elsewhere; the rover has arrived all the same.
-    if (cycle.goal.arrived && !input.last.is_odometry_alone()) || cycle.arrival_actions > 0 {
+    if (cycle.goal.arrived && input.last.why_not_searched().is_none()) || cycle.arrival_actions > 0 {
         return end(StopReason::Arrived, cycle.goal.distance_m, command.tolerance_m);
     }
     // The baseline drives on whatever tracking makes of it.
@@ -125,7 +130,7 @@ pub(super) fn ending(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &Cycle) -
         if let Some(slip) = slip.filter(|slip| *slip > command.slip_max) {
             return end(StopReason::Slip, slip, command.slip_max);
         }
-        let refusals = refusals(stops, [input.first.step, cycle.step]);
+        let refusals = refusals(stops, [input.since(), cycle.step]);
         if let Some(most) = command.refusals_max.filter(|most| refusals > *most as usize) {
             return end(StopReason::OdometryRefused, refusals as f64, f64::from(most));
         }
@@ -140,7 +145,7 @@ pub(super) fn ending(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &Cycle) -
     if count >= command.stops_max as usize {
         return end(StopReason::StopLimit, count as f64, f64::from(command.stops_max));
     }
-    let visits = visits(stops, [input.first.step, cycle.step]);
+    let visits = visits(stops, [input.since(), cycle.step]);
     (visits.len() >= limit_cycle::VISITS_MAX)
         .then(|| Ending::named(StopReason::LimitCycle, Some(limit_cycle::sentence(&visits))))
 }

@@ -84,6 +84,13 @@ pub struct CycleInput<'a> {
     pub hazards: Option<&'a StopHazards>,
 }
 
+impl CycleInput<'_> {
+    /// The stop at which the rover was sent to this target.
+    pub fn since(&self) -> usize {
+        self.command.since.unwrap_or(self.first.step)
+    }
+}
+
 /// One cycle: decides at the last stop and, unless the drive ends there, drives, points the mast and tracks at the next.
 ///
 /// # Errors
@@ -158,19 +165,20 @@ pub fn drive(world: &mut dyn ActiveWorld, input: &CycleInput<'_>, cancel: Cancel
 pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
     let step = input.last.step;
     let pose = stops.site_from_rover(step);
-    let start = stops.site_from_rover(input.first.step).translation.vector;
+    let start = stops.site_from_rover(input.since()).translation.vector;
     let target_in_site = target_in_site(input, stops);
     let goal = set_goal(input.command, &target_in_site, [start.x, start.y], &pose);
     let (left, right) = stops.cameras(step);
     let mut time = FlightTime::of_stop([left.size, right.size], stops.measured_motion(step));
-    if input.last.is_odometry_alone() {
+    if input.last.why_not_searched().is_some() {
         time = time.without_tracking(input.command.odometry_pair);
     }
     if let Some(sizes) = input.hazards.and_then(|hazards| hazards.image_sizes) {
         time = time.with_hazards(sizes);
     }
     let flight_minutes = input.before.map_or(0.0, |before| before.flight_minutes) + time.total_s() / 60.0;
-    let arrival_actions = input.before.map_or(0, |before| before.arrival_actions);
+    let before_here = input.before.filter(|before| before.step >= input.since());
+    let arrival_actions = before_here.map_or(0, |before| before.arrival_actions);
     let [estimated, by_wheels] = reckoned(stops, input, &pose);
     let mut cycle = Cycle {
         step,
@@ -188,6 +196,11 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
         flight_minutes,
         ending: None,
     };
+    if input.last.is_out_of_view() {
+        // The mast was pointed at another target: look at this one first.
+        cycle.ending = ending(stops, input, &cycle);
+        return cycle;
+    }
     let has_arrived = (goal.arrived && !input.last.is_odometry_alone()) || arrival_actions > 0;
     let action = input.command.on_arrival.get(arrival_actions as usize).filter(|_| has_arrived);
     if let Some(ArrivalAction::Look) = action {
@@ -244,6 +257,7 @@ pub fn point_mast(world: &mut dyn ActiveWorld, last: &Updated) -> Result<()> {
     let predicted =
         predict::predict(&last.target, &then, &now, &PoseChangeError::Modelled(stops.odometry_error()));
     let wanted = stops.mast().and_then(|mast| mast.point_left_centre_at(&predicted.position_in_rover));
+    world.keep_mast_target(last.target.designation)?;
     world.point_mast(wanted)?;
     let (left, _) = world.stops().cameras(last.target.step + 1);
     let around = left.project(&predicted.position_in_rover);

@@ -54,7 +54,6 @@ use sightline_geometry::frames::Pixel;
 use sightline_track::limits::SettingInfo;
 use sightline_track::settings::Changes;
 use sightline_track::target::TrackingState;
-use sightline_track::trace::ODOMETRY_ALONE;
 
 /// What a change is to bring about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -176,8 +175,8 @@ pub fn goal(base: &Base<'_>) -> Result<Goal> {
     if let Some(fault) = base.recorded.fault() {
         return refuse(format!("the files of step {step} are at fault, which no setting mends: {fault}"));
     }
-    if base.recorded.is_odometry_alone() {
-        return refuse(format!("at step {step} {ODOMETRY_ALONE}: choose a tracked step"));
+    if let Some(why) = base.recorded.why_not_searched() {
+        return refuse(format!("at step {step} {why}: choose a tracked step"));
     }
     if let Some(before) = base.recorded.paused_before() {
         return refuse(format!(

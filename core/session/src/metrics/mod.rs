@@ -139,7 +139,8 @@ impl Judged<'_> {
 pub fn metrics(steps: &[Arc<RunStep>]) -> RunMetrics {
     let later = steps.iter().skip(1).map(AsRef::as_ref);
     let (faulty, good): (Vec<&RunStep>, Vec<&RunStep>) = later.partition(|trace| trace.fault().is_some());
-    let (alone, good): (Vec<_>, Vec<_>) = good.into_iter().partition(|trace| trace.is_odometry_alone());
+    let (alone, good): (Vec<_>, Vec<_>) =
+        good.into_iter().partition(|trace| trace.why_not_searched().is_some());
     let judged: Vec<Judged<'_>> = good
         .into_iter()
         .map(|trace| Judged {

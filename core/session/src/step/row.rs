@@ -64,6 +64,10 @@ pub struct StepRow {
     /// Whether the stop's files are damaged, so that nothing could be done.
     #[serde(default)]
     pub fault: bool,
+    /// Whether the tracker did not look for the target; the schema leaves it out, as `reason` names why.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    #[schema(ignore)]
+    pub not_searched: bool,
     /// Rejected updates in a row up to this step while the state is `lost`; `None` in other states.
     ///
     /// Expressions name the same value in the record (`update.state`), so the schema leaves it out.

@@ -32,6 +32,9 @@ struct SerialisedStep<'a> {
     time_s: f64,
     /// What is wrong with the stop's files, as one sentence.
     fault: Option<Cow<'a, str>>,
+    /// Whether the mast is pointed at another target and this one is out of view; left out where it is not.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    out_of_view: bool,
     /// Stage 1.
     predict: Option<Cow<'a, Prediction>>,
     /// Stage 2.
@@ -72,6 +75,7 @@ impl<'a> From<&'a RunStep> for SerialisedStep<'a> {
             step: trace.step,
             time_s: trace.time_s,
             fault: trace.fault().map(Cow::Borrowed),
+            out_of_view: trace.is_out_of_view(),
             predict: trace.prediction().map(Cow::Borrowed),
             point_mast: trace.pointing().map(Cow::Borrowed),
             capture: trace.capture().map(Cow::Borrowed),
@@ -111,6 +115,7 @@ impl SerialisedStep<'_> {
             (Some(predict), Some(capture), Some(locate), Some(judge), None) => {
                 StepKind::Tracked { predict, capture, locate, judge }
             }
+            (Some(predict), None, None, None, None) if self.out_of_view => StepKind::OutOfView { predict },
             (Some(predict), None, None, None, None) => StepKind::OdometryAlone { predict },
             (Some(predict), None, None, None, Some(fault)) => StepKind::Damaged { predict, fault },
             _ => return None,
@@ -193,7 +198,7 @@ mod tests {
         }
     }
 
-    fn kinds() -> [StepKind; 6] {
+    fn kinds() -> [StepKind; 7] {
         let predict = Prediction {
             position_in_rover: Point3::new(5.0, 0.0, 0.0),
             position_in_site: Point3::new(5.0, 0.0, 0.0),
@@ -228,6 +233,7 @@ mod tests {
             StepKind::Tracked { predict: predict.clone(), capture: capture.clone(), locate, judge },
             begun(false, None),
             begun(true, Some(capture)),
+            StepKind::OutOfView { predict: predict.clone() },
             StepKind::OdometryAlone { predict: predict.clone() },
             StepKind::Damaged { predict, fault: "left_0003.png is missing".to_owned() },
         ]
@@ -240,6 +246,7 @@ mod tests {
             vec!["predict", "point_mast", "capture", "locate", "judge"],
             vec!["begun", "predict"],
             vec!["begun", "predict", "point_mast", "capture"],
+            vec!["out_of_view", "predict", "point_mast"],
             vec!["predict", "point_mast"],
             vec!["fault", "predict", "point_mast"],
         ];
@@ -247,7 +254,8 @@ mod tests {
             let step = step(kind);
             let value = serde_json::to_value(&step).unwrap();
             let is_begun = reached.contains(&"begun");
-            assert_eq!(value.as_object().unwrap().len(), 10 + usize::from(is_begun));
+            let further = usize::from(is_begun) + usize::from(reached.contains(&"out_of_view"));
+            assert_eq!(value.as_object().unwrap().len(), 10 + further);
             assert_eq!(value["update"].is_null(), is_begun);
             for stage in ["fault", "predict", "point_mast", "capture", "locate", "judge"] {
                 assert_eq!(value[stage].is_null(), !reached.contains(&stage), "{stage}");
@@ -265,7 +273,7 @@ mod tests {
             let error = serde_json::from_value::<RunStep>(without).unwrap_err();
             assert!(error.to_string().contains("no kind of step"), "{stage}: {error}");
         }
-        let [.., begun, _] = kinds().map(|kind| serde_json::to_value(step(kind)).unwrap());
+        let [.., begun, _, _, _] = kinds().map(|kind| serde_json::to_value(step(kind)).unwrap());
         for (field, value) in
             [("before", json!("judge")), ("before", json!("capture")), ("carried", Value::Null)]
         {

@@ -150,6 +150,11 @@ impl StoppedDrive<'_> {
         })
     }
 
+    /// The stop at which the rover was sent to this target.
+    fn since(&self) -> Option<usize> {
+        self.command.since.or_else(|| Some(self.steps.first()?.step))
+    }
+
     fn reason(&self) -> Option<StopReason> {
         Some(self.cycles.last()?.ending.as_ref()?.reason)
     }
@@ -157,7 +162,7 @@ impl StoppedDrive<'_> {
     /// The decisions since the visit before the last one to one place.
     fn round(&self) -> Option<Vec<&Cycle>> {
         let last = self.cycles.last()?.step;
-        let visits = visits(self.stops, [self.steps.first()?.step, last]);
+        let visits = visits(self.stops, [self.since()?, last]);
         let before = *visits.iter().rev().nth(1)?;
         Some(self.cycles.iter().filter(|cycle| (before..last).contains(&cycle.step)).collect())
     }
@@ -168,7 +173,7 @@ impl StoppedDrive<'_> {
         if self.reason()? != StopReason::LimitCycle {
             return None;
         }
-        let visits = visits(self.stops, [self.steps.first()?.step, last.step]);
+        let visits = visits(self.stops, [self.since()?, last.step]);
         let round = self.round()?;
         let motions: Vec<String> =
             round.iter().filter_map(|cycle| cycle.motion.as_ref()).map(words::motion).collect();

@@ -51,7 +51,7 @@ impl StoppedDrive<'_> {
         if self.command.odometry == OdometryMode::Off {
             return None;
         }
-        let (first, last) = (self.steps.first()?.step, self.steps.last()?.step);
+        let (first, last) = (self.since()?, self.steps.last()?.step);
         let count = refusals(self.stops, [first, last]);
         let is_reason = self.reason()? == StopReason::OdometryRefused;
         if count < REFUSALS_MIN && !is_reason {

@@ -16,7 +16,6 @@ use sightline_track::locate::Evidence;
 use sightline_track::settings::Settings;
 use sightline_track::stages::judge::{Gate, Verdict};
 use sightline_track::target::TrackingState;
-use sightline_track::trace::ODOMETRY_ALONE;
 
 /// A peak so near to the rim may belong to one beyond it, px.
 pub(super) const AT_RIM_PX: f64 = 3.0;
@@ -60,8 +59,8 @@ impl Book<'_> {
                 before.word()
             ));
         }
-        if trace.is_odometry_alone() {
-            return Summary::new(format!("Nothing is judged here: {ODOMETRY_ALONE}."));
+        if let Some(why) = trace.why_not_searched() {
+            return Summary::new(format!("Nothing is judged here: {why}."));
         }
         let Some(verdict) = trace.verdict() else {
             return Summary::new("Target designated here; no match yet.");

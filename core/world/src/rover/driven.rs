@@ -24,6 +24,7 @@ use sightline_geometry::frames::{POSITION_LIMIT_M, Pixel, Pose, PoseRecord, Vect
 use sightline_rover::driving::flight_time::{SPEED_M_S, TURN_RAD_S};
 use sightline_rover::visual_odometry::MeasuredMotion;
 use sightline_track::cycle_stage::CycleStage;
+use sightline_track::target::Designation;
 
 use crate::ground::texture::mix;
 use crate::index::{PAUSE_S, Rigs, odometry_pair, simulated_stop};
@@ -75,6 +76,9 @@ pub struct DrivenStop {
     /// Whether visual odometry runs alone at this stop.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub odometry_alone: bool,
+    /// The target at which the mast was pointed here; `None` before that.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mast_target: Option<Designation>,
     /// Tilt of the rover by the accelerometers, deg; `None` where the estimated pose still has it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub measured_tilt_deg: Option<f64>,
@@ -106,6 +110,7 @@ impl DrivenStop {
             wheel_places_m: Vec::new(),
             odometry: None,
             odometry_alone: false,
+            mast_target: None,
             measured_tilt_deg: None,
             awaits: None,
         })
@@ -146,6 +151,7 @@ impl DrivenStop {
                 wheel_places_m: if scenario.rover.tracks { places_m(&leg) } else { Vec::new() },
                 odometry: None,
                 odometry_alone: false,
+                mast_target: None,
                 measured_tilt_deg: None,
                 awaits: None,
             })
@@ -167,6 +173,7 @@ impl DrivenStop {
             wheel_places_m: Vec::new(),
             odometry: None,
             odometry_alone: false,
+            mast_target: None,
             awaits: None,
             ..self.clone()
         }
@@ -280,7 +287,8 @@ pub fn index_stops(driven: &[DrivenStop], scenario: &Scenario) -> Vec<Stop> {
         let wheel_places_m = scenario.rover.tracks.then(|| stop.wheel_places_m.clone());
         let truth = made.truth.map(|truth| StopTruth { wheel_places_m, ..truth });
         let (odometry, odometry_alone) = (stop.odometry.clone(), stop.odometry_alone);
-        Stop { metered_px, truth, odometry, odometry_alone, cameras, ..made }
+        let mast_target = stop.mast_target;
+        Stop { metered_px, truth, odometry, odometry_alone, mast_target, cameras, ..made }
     };
     driven.iter().enumerate().map(stop).collect()
 }

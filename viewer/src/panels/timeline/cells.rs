@@ -1,9 +1,7 @@
 //! What a stop shows on a state band, by colour, pattern and word.
 
 use egui::{Color32, Painter, Rect, Shape, Stroke, pos2, vec2};
-use sightline_session::step::StepRow;
 use sightline_session::view::{RunView, TargetView};
-use sightline_track::trace::ODOMETRY_ALONE;
 
 use crate::state::{State, row_of};
 use crate::theme;
@@ -72,7 +70,7 @@ pub(crate) fn cell_of(target: &TargetView, run: Option<&RunView>, step: usize) -
     match run.and_then(|run| row_of(run, step)) {
         None => Cell::Unknown,
         Some(row) if row.fault => Cell::Fault,
-        Some(row) if is_not_searched(row) => Cell::NotSearched,
+        Some(row) if row.not_searched => Cell::NotSearched,
         Some(row) if row.state == "tracking" && row.tracked == Some(false) => Cell::FalseTracking,
         Some(row) => match row.state.as_str() {
             "tracking" => Cell::Tracking,
@@ -81,11 +79,6 @@ pub(crate) fn cell_of(target: &TargetView, run: Option<&RunView>, step: usize) -
             _ => Cell::Unknown,
         },
     }
-}
-
-/// Whether visual odometry ran alone at a step, so that the tracker did not look for the target.
-pub(crate) fn is_not_searched(row: &StepRow) -> bool {
-    row.reason.as_deref() == Some(ODOMETRY_ALONE)
 }
 
 /// Paints a stretch of equal cells.

@@ -36,5 +36,5 @@ pub(crate) fn over_image(ui: &mut Ui, canvas: &Canvas, state: &State, out: &mut 
 
 /// Whether a step has a prediction that can be put elsewhere and settings that can be tried.
 pub(crate) fn can_be_tried(trace: &StepTrace) -> bool {
-    trace.prediction().is_some() && trace.fault().is_none() && !trace.is_odometry_alone()
+    trace.prediction().is_some() && trace.fault().is_none() && trace.why_not_searched().is_none()
 }

@@ -12,7 +12,6 @@ use sightline_session::why::sentence::Summary;
 use crate::command::Command;
 use crate::panels::pane::Need;
 use crate::panels::panel::Panel;
-use crate::panels::timeline::cells;
 use crate::state::State;
 use crate::theme;
 use crate::what_if::panel;
@@ -70,7 +69,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 /// The headline with its bullets, in a frame of the colour of the tracking state.
 fn card(ui: &mut Ui, state: &State, summary: &Summary) {
     let colour = match state.row() {
-        Some(row) if cells::is_not_searched(row) => theme::weak(),
+        Some(row) if row.not_searched => theme::weak(),
         Some(row) if row.state == "tracking" && row.tracked == Some(false) => theme::failed(),
         _ => theme::state(state.tracking().unwrap_or_default()),
     };

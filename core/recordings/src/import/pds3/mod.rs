@@ -85,6 +85,7 @@ impl ImportFormat for Pds3 {
                 metered_px: None,
                 odometry: None,
                 odometry_alone: false,
+                mast_target: None,
                 truth: None,
                 cameras: write_further(pair, further.get(step).map_or(&[], Vec::as_slice), &scale, output)?,
             });

@@ -1,0 +1,182 @@
+//! A targeted drive from its first stop to its end, without a session: what the command line, studies and tests drive.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use crate::driving::{DriveSummary, check_command, summary};
+use crate::step::RunStep;
+use crate::stop_cause::{Explained, StopExplanation};
+use crate::track::{self, NextStep};
+use crate::visits::Visit;
+use sightline_geometry::cancel::Cancel;
+use sightline_geometry::error::{Error, Result};
+use sightline_recordings::DrivenTraverse;
+use sightline_rover::driving::executive::{self, CycleInput};
+use sightline_rover::driving::{Cycle, DriveCommand, Ending, HazardMaps};
+use sightline_track::settings::Settings;
+use sightline_track::target::Designation;
+
+/// A drive towards one target, or to several in turn.
+pub struct TargetedDrive {
+    /// The world, at the stop of the last step.
+    pub world: DrivenTraverse,
+    /// The command.
+    pub command: DriveCommand,
+    /// The number of the target that the rover drives to, in the order of their visits.
+    pub target: usize,
+    /// The steps of that target so far; the first is the designation.
+    pub steps: Vec<Arc<RunStep>>,
+    /// The decisions at the stops of the steps, one fewer than there are steps until the drive has ended.
+    pub cycles: Vec<Cycle>,
+    /// The hazard maps of the stops so far.
+    pub maps: HazardMaps,
+    /// The visits that have ended, of a drive to several targets.
+    pub visits: Vec<Visit>,
+    /// The steps of the targets to which it drives afterwards.
+    then: VecDeque<Vec<Arc<RunStep>>>,
+}
+
+impl TargetedDrive {
+    /// Designates the target at the first stop and takes the command.
+    ///
+    /// # Errors
+    /// A pixel without a 3-D position, a command that makes no sense for the target, or [`Error::Cancelled`].
+    pub fn begin(
+        world: DrivenTraverse,
+        designation: Designation,
+        command: DriveCommand,
+        settings: &Settings,
+        cancel: Cancel<'_>,
+    ) -> Result<Self> {
+        Self::begin_to(world, &[designation], command, settings, cancel)
+    }
+
+    /// The same for several targets, which are visited in this order.
+    ///
+    /// # Errors
+    /// As [`Self::begin`], and no target at all.
+    pub fn begin_to(
+        world: DrivenTraverse,
+        targets: &[Designation],
+        command: DriveCommand,
+        settings: &Settings,
+        cancel: Cancel<'_>,
+    ) -> Result<Self> {
+        command.validate()?;
+        let last = world.traverse().stop_count() - 1;
+        let mut all = VecDeque::with_capacity(targets.len());
+        for designation in targets {
+            if designation.step != last {
+                let problem = format!(
+                    "step {} is not the stop at which the rover stands, which is {last}",
+                    designation.step
+                );
+                return Err(Error::Target(problem));
+            }
+            let first = track::designate_until(world.traverse(), *designation, settings, cancel)?;
+            all.push_back(vec![Arc::new(first)]);
+        }
+        let Some(steps) = all.pop_front() else {
+            return Err(Error::Target("a drive needs a target".to_owned()));
+        };
+        check_command(world.traverse(), &command, &steps[0].trace)?;
+        let (cycles, maps, visits) = (Vec::new(), HazardMaps::default(), Vec::new());
+        Ok(Self { world, command, target: 0, steps, cycles, maps, visits, then: all })
+    }
+
+    /// Whether it is a drive to several targets.
+    pub fn has_several_targets(&self) -> bool {
+        self.target > 0 || !self.then.is_empty()
+    }
+
+    /// The end of the drive; `None` while it goes on.
+    pub fn ending(&self) -> Option<Ending> {
+        self.cycles.last()?.ending.clone()
+    }
+
+    /// Decides at the last stop and drives to the next, where all targets are tracked; false once the drive to this target has
+    /// ended.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`], or ground that cannot be driven on; the drive is then as it was before.
+    pub fn advance(&mut self, settings: &Settings, cancel: Cancel<'_>) -> Result<bool> {
+        if self.ending().is_some() {
+            return Ok(false);
+        }
+        let (Some(first), Some(last)) = (self.steps.first().cloned(), self.steps.last().cloned()) else {
+            return Ok(false);
+        };
+        let hazards =
+            self.maps.at(self.world.traverse(), &self.command, [&first.trace, &last.trace], cancel)?;
+        let input = CycleInput {
+            command: &self.command,
+            navigator: &*self.command.navigator.navigator(),
+            first: &first.trace,
+            last: &last.trace,
+            before: self.cycles.last(),
+            hazards: hazards.as_deref(),
+        };
+        let before = self.world.state().to_vec();
+        let advanced = executive::advance(&mut self.world, &input, settings, cancel)
+            .and_then(|(cycle, trace)| Ok((cycle, trace, self.track_others(settings, cancel)?)));
+        let (cycle, trace, others) = match advanced {
+            Ok(advanced) => advanced,
+            Err(error) => {
+                self.world.restore(before)?;
+                return Err(error);
+            }
+        };
+        self.cycles.push(cycle);
+        let Some(trace) = trace else { return Ok(false) };
+        let step = track::compared(self.world.traverse(), trace, Some(&first.trace));
+        self.steps.push(Arc::new(step));
+        self.then.iter_mut().zip(others).for_each(|(steps, other)| steps.extend(other));
+        Ok(true)
+    }
+
+    /// The steps at the last stop of the targets that are visited afterwards; `None` for one that has it.
+    fn track_others(&self, settings: &Settings, cancel: Cancel<'_>) -> Result<Vec<Option<Arc<RunStep>>>> {
+        let traverse = self.world.traverse();
+        let track = |steps: &Vec<Arc<RunStep>>| {
+            let (Some(first), Some(last)) = (steps.first(), steps.last()) else { return Ok(None) };
+            if last.step + 1 == traverse.stop_count() {
+                return Ok(None);
+            }
+            let (prediction_px, before, ended) = (None, None, None);
+            let next = NextStep { first, last, settings, prediction_px, before, ended, cancel };
+            next.compute(traverse).map(|step| Some(Arc::new(step)))
+        };
+        self.then.iter().map(track).collect()
+    }
+
+    /// Sends the rover to the next target once the drive to the present one has ended, and notes that visit; false where there is
+    /// no next one, or the rover cannot drive on. Then [`Self::advance`] goes on.
+    pub fn visit_next(&mut self) -> bool {
+        let Some(ending) = self.ending() else { return false };
+        if !self.then.is_empty() || !self.visits.is_empty() {
+            let visit = Visit::of(&self.world, &self.command, (self.target, &self.steps), &ending);
+            self.visits.push(visit);
+        }
+        if !ending.reason.is_of_target() {
+            return false;
+        }
+        let Some(steps) = self.then.pop_front() else { return false };
+        self.command.since = self.steps.last().map(|last| last.step);
+        self.steps = steps;
+        self.target += 1;
+        // The decision of this stop is made anew, for the next target.
+        self.cycles.pop();
+        true
+    }
+
+    /// The outcome so far, for the present target.
+    pub fn summary(&self) -> DriveSummary {
+        summary(&self.world, &self.command, &self.steps, &self.cycles)
+    }
+
+    /// Why the drive stopped; `None` while it goes on, and where it has arrived.
+    pub fn why(&mut self) -> Option<StopExplanation> {
+        let (traverse, maps) = (self.world.traverse(), &mut self.maps);
+        Explained::default().of(traverse, &self.command, &self.steps, &self.cycles, maps)
+    }
+}

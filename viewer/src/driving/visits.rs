@@ -1,0 +1,113 @@
+//! A drive to several targets: which are visited afterwards, and how the visits ended.
+
+use egui::{Label, RichText, Ui};
+use sightline_rover::driving::StopReason;
+use sightline_session::driving::DriveView;
+use sightline_session::visits::Visit;
+
+use crate::command::Command;
+use crate::driving::Ask;
+use crate::panels::numbers::fixed;
+use crate::state::State;
+use crate::theme;
+
+/// The targets that the rover can visit after the present one, each with a check; their order is that of the checks.
+pub(super) fn form(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
+    let Some(session) = &state.session else { return };
+    let driver = state.drive().and_then(|drive| drive.steering.as_ref()).map(|steering| steering.target);
+    let first = driver.or(state.cursor.target);
+    let others: Vec<_> = session.targets.iter().filter(|target| Some(target.number) != first).collect();
+    if others.is_empty() {
+        return;
+    }
+    let mut then = state.driving.then.clone();
+    ui.horizontal_wrapped(|ui| {
+        ui.label(theme::label("then visit"));
+        for target in others {
+            let place = then.iter().position(|number| *number == target.number);
+            let name = match place {
+                Some(place) => format!("{} ({})", target.label, place + 2),
+                None => target.label.clone(),
+            };
+            let mut is_visited = place.is_some();
+            let help = "The rover drives to it afterwards; the number is its place in the order. It is tracked meanwhile where it is in \
+                        view. A target that is lost or cannot be reached is dropped.";
+            let shown = ui.checkbox(&mut is_visited, name).on_hover_text(help);
+            if shown.accessible_name(format!("then visit {}", target.label)).changed() {
+                then.retain(|number| *number != target.number);
+                if is_visited {
+                    then.push(target.number);
+                }
+            }
+        }
+    });
+    if then != state.driving.then {
+        out.push(Command::Drive(Ask::Then(then)));
+    }
+}
+
+/// One line a visit that has ended, and the targets that are left.
+pub(super) fn list(ui: &mut Ui, state: &State, drive: &DriveView) {
+    let label = |number: usize| {
+        let targets = state.session.iter().flat_map(|session| &session.targets);
+        let found = targets.into_iter().find(|target| target.number == number);
+        found.map_or_else(|| format!("target {}", number + 1), |target| target.label.clone())
+    };
+    for visit in &drive.visits {
+        let colour = theme::verdict(visit.reason == StopReason::Arrived);
+        let text = RichText::new(sentence(&label(visit.target), visit)).color(colour).small();
+        ui.add(Label::new(text).wrap());
+    }
+    let Some(steering) = drive.steering.as_ref().filter(|_| !drive.visits.is_empty()) else { return };
+    if drive.visits.iter().all(|visit| visit.target != steering.target) {
+        let mut words = format!("now: {}", label(steering.target));
+        if !steering.then.is_empty() {
+            let left: Vec<String> = steering.then.iter().map(|number| label(*number)).collect();
+            words += &format!("; then {}", left.join(", "));
+        }
+        ui.add(Label::new(theme::note(words)).wrap());
+    }
+}
+
+/// How a visit ended.
+fn sentence(label: &str, visit: &Visit) -> String {
+    let reason = match visit.reason {
+        StopReason::Arrived => "arrived".to_owned(),
+        other => format!("dropped, {}", other.word()),
+    };
+    let mut words = format!("{label}: {reason} at stop {}", visit.until);
+    if visit.reason == StopReason::Arrived
+        && let (Some(target_m), Some(goal_m)) = (visit.target_error_m, visit.goal_error_m)
+    {
+        let [target, goal] = [target_m, goal_m].map(|error_m| fixed(100.0 * error_m, 1));
+        words += &format!("; by the truth: target error {target} cm, goal error {goal} cm");
+    }
+    words
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_visit_says_whether_the_target_was_reached() {
+        let visit = |reason| Visit {
+            target: 1,
+            since: 4,
+            until: 9,
+            reason,
+            detail: None,
+            target_error_m: Some(0.004),
+            goal_error_m: Some(0.012),
+        };
+        let arrived = sentence("flat rock", &visit(StopReason::Arrived));
+        assert_eq!(
+            arrived,
+            "flat rock: arrived at stop 9; by the truth: target error 0.4 cm, goal error 1.2 cm"
+        );
+        assert_eq!(
+            sentence("flat rock", &visit(StopReason::Lost)),
+            "flat rock: dropped, target lost at stop 9"
+        );
+    }
+}
