@@ -36,3 +36,12 @@ pub fn rock_on_the_way() -> Scenario {
     scenario.rocks.placed[0].x_m = -4.5;
     scenario
 }
+
+/// Starts 6 m from five targets on the rocks around the goal; the planned drive ends at 5.3 m.
+pub fn several_targets() -> Scenario {
+    let mut scenario = library::scenario("five-targets").expect("a scenario of the library");
+    (scenario.camera.image_size, scenario.camera.samples_per_axis) = (512, 1);
+    scenario.targets.window_px = 9;
+    (scenario.drive.start_distance_m, scenario.drive.end_distance_m) = (6.0, 5.3);
+    scenario
+}

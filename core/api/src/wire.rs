@@ -11,6 +11,7 @@ use sightline_geometry::stereo_geometry::StereoGeometry;
 use sightline_rover::designate::Place;
 use sightline_rover::driving::DriveCommand;
 use sightline_rover::visual_odometry::{MeasuredMotion, OdometryCorner, OdometrySettings};
+use sightline_session::faults::NewFault;
 use sightline_session::pause::StagePause;
 use sightline_session::view::SessionView;
 use sightline_track::settings::Changes;
@@ -282,6 +283,9 @@ pub struct NewDrive {
     /// The targets to which it drives afterwards, in this order, by their numbers.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub then: Vec<usize>,
+    /// Faults to be injected, beside those of the drive from which it branches.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub faults: Vec<NewFault>,
     /// The stop from which it drives; left out: the last one of a drive on commands, the first one of any other.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub from_step: Option<usize>,

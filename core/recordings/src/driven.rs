@@ -22,6 +22,7 @@ use sightline_rover::visual_odometry::MeasuredMotion;
 use sightline_track::cycle_stage::CycleStage;
 use sightline_track::target::Designation;
 use sightline_world::rover::driven::{DrivenStop, index_stops};
+use sightline_world::scenario::Fault;
 use sightline_world::traverse::View;
 use sightline_world::{SCENARIO_FILE, Scenario, World};
 
@@ -94,20 +95,31 @@ impl DrivenTraverse {
         Ok(driven)
     }
 
-    /// Makes another drive of the same world that shares the first `count` stops and goes its own way from there.
+    /// Makes another drive of the same world that shares the first `count` stops and goes its own way from there, with `faults`
+    /// injected at later ones.
     ///
     /// # Errors
-    /// A count of none or of more stops than there are, or a folder that holds something already or cannot be written.
-    pub fn branch(&self, count: usize, folder: &Path, cancel: Cancel<'_>) -> Result<Self> {
+    /// A count of none or of more stops than there are, a fault at one of them, or a folder that holds something already or cannot be
+    /// written.
+    pub fn branch(&self, count: usize, faults: &[Fault], folder: &Path, cancel: Cancel<'_>) -> Result<Self> {
         if count == 0 || count > self.driven.len() {
             let problem =
                 format!("the drive has {} stops, of which {count} cannot be shared", self.driven.len());
             return Err(Error::Request(problem));
         }
-        Self::check(&self.scenario, folder)?;
+        if let Some(index) = faults.iter().position(|fault| (fault.from_stop as usize) < count) {
+            let problem = format!(
+                "the rover has come to stop {} already; choose stop {count} or a later one",
+                count - 1
+            );
+            return Err(Error::setting(&format!("faults[{index}].from_stop"), problem));
+        }
+        let mut scenario = self.scenario.clone();
+        scenario.events.faults.extend_from_slice(faults);
+        Self::check(&scenario, folder)?;
         let simulated = self.traverse.simulated.as_ref().ok_or_else(no_simulation)?;
         let world = simulated.world_until(cancel)?.clone();
-        let mut branch = Self::begin_in(world, &self.scenario, folder, cancel)?;
+        let mut branch = Self::begin_in(world, &scenario, folder, cancel)?;
         branch.replace(self.driven[..count].to_vec(), self.decisions.cut(count))?;
         for stop in &self.traverse.index().stops[..count] {
             for View { image: name, .. } in stop.views() {
@@ -141,6 +153,11 @@ impl DrivenTraverse {
         }
         resumed.replace(driven, decisions)?;
         Ok(resumed)
+    }
+
+    /// The faults that were injected.
+    pub fn faults(&self) -> &[Fault] {
+        &self.scenario.events.faults
     }
 
     /// The stops so far as a traverse.

@@ -38,9 +38,11 @@ use sightline_geometry::error::{Error, Result};
 use sightline_vision::image::{GrayImage, io};
 use sightline_world::camera::exposure::{Rates, automatic, fixed_of_further_s, fixed_s};
 use sightline_world::moment::Moment;
-use sightline_world::scenario::ExposureMode;
+use sightline_world::scenario::{ExposureMode, FaultKind};
 use sightline_world::traverse::{Stop, TraverseIndex, View};
-use sightline_world::{Eye, NoiseSeed, Region, Scenario, World, add_ghosts, clean_radiance, develop_until};
+use sightline_world::{
+    Eye, NoiseSeed, Region, Scenario, World, add_dust, add_ghosts, clean_radiance, develop_until,
+};
 
 /// Pixels of a kept picture that are rendered anew before it is believed.
 const PROBES: u32 = 16;
@@ -114,6 +116,13 @@ impl Simulated {
         camera: Option<CameraName>,
         cancel: &AtomicBool,
     ) -> Result<()> {
+        if camera.is_none_or(|name| name == CameraName::ODOMETRY)
+            && self.scenario.events.has_fault(FaultKind::CameraDropOut, step as u32)
+        {
+            return Err(Error::Request(format!(
+                "the cameras gave no images at stop {step} (injected drop-out)"
+            )));
+        }
         let _guard = lock(&self.locks[step]);
         let (left, right) = views(&stops.index.stops[step], camera).ok_or_else(|| no_camera(step, camera))?;
         for (eye, view) in [(Eye::Left, Some(left)), (Eye::Right, right)] {
@@ -197,24 +206,25 @@ impl Simulated {
         let moment = Moment::of(step, &stops.index.stops).ok_or_else(|| Error::Request(needs_truth(step)))?;
         let world = self.world_until(cancel.into())?.at(&moment, &self.scenario);
         let render = |region: Region| clean_radiance(&world, &self.scenario, &camera, region, cancel);
-        let with_ghosts = |mut radiance: GrayImage| {
+        let with_events = |mut radiance: GrayImage| {
             if let Some(name) = picture.0 {
                 let at = (name, moment.stop);
                 add_ghosts(&mut radiance, &self.scenario, at, &camera, &moment.site_from_rover);
             }
+            add_dust(&mut radiance, &self.scenario, moment.stop);
             radiance
         };
         let key = render_cache::key(&self.scenario, &stop_key(&moment, &stops.index.stops[step]), &camera);
         if let Some(kept) = self.cache.load(&key, &camera)
             && renders_alike(&kept, render)?
         {
-            let kept = with_ghosts(kept);
+            let kept = with_events(kept);
             return Ok((camera, kept));
         }
         let radiance = render(Region::whole(&camera))?;
         self.rendered.fetch_add(1, Ordering::Relaxed);
         self.cache.store(&key, &radiance);
-        let radiance = with_ghosts(radiance);
+        let radiance = with_events(radiance);
         Ok((camera, radiance))
     }
 

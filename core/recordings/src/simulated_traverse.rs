@@ -11,6 +11,7 @@ use super::simulated::{needs_truth, read_scenario};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_world::moment::{Moment, sun_at};
+use sightline_world::scenario::EventSettings;
 use sightline_world::traverse::{Stop, StopLight};
 use sightline_world::{SCENARIO_FILE, Scenario, World};
 
@@ -118,7 +119,8 @@ impl Traverse {
 
     /// Whether something stands in the way at some of the stops.
     pub(super) fn has_occluders(&self) -> bool {
-        self.simulated.as_ref().is_some_and(|simulated| !simulated.scenario.events.occluders.is_empty())
+        let events = self.simulated.as_ref().map(|simulated| &simulated.scenario.events);
+        events.is_some_and(EventSettings::has_occluders)
     }
 
     /// Saves building the world again; one that is there already is the same.

@@ -16,8 +16,9 @@ use sightline_rover::visual_odometry::MeasuredMotion;
 use sightline_track::locate::store::Shared;
 use sightline_track::stages::capture::StereoPair;
 use sightline_track::target::Designation;
-use sightline_world::surface_point;
+use sightline_world::scenario::FaultKind;
 use sightline_world::target_truth::TruthSource;
+use sightline_world::{Scenario, surface_point};
 
 use super::Traverse;
 use super::check::FurtherCameras;
@@ -54,6 +55,10 @@ impl Stops for Traverse {
     }
     fn is_odometry_alone(&self, step: usize) -> bool {
         self.index().stops[step].odometry_alone
+    }
+    fn has_dropped_out(&self, step: usize) -> bool {
+        let is_fault = |scenario: &Scenario| scenario.events.has_fault(FaultKind::CameraDropOut, step as u32);
+        self.simulated.as_ref().is_some_and(|simulated| is_fault(&simulated.scenario))
     }
     fn mast_target(&self, step: usize) -> Option<Designation> {
         self.index().stops[step].mast_target

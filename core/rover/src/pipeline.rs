@@ -58,6 +58,10 @@ pub trait Stops {
     fn is_odometry_alone(&self, _step: usize) -> bool {
         false
     }
+    /// Whether the cameras on the mast gave no images at a stop.
+    fn has_dropped_out(&self, _step: usize) -> bool {
+        false
+    }
     /// The target at which the mast was pointed at a stop; `None` where it was pointed at none, or nobody knows.
     fn mast_target(&self, _step: usize) -> Option<Designation> {
         None

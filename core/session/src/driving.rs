@@ -22,6 +22,7 @@ use sightline_rover::driving::set_goal::goal_position_m;
 use sightline_rover::driving::{Cycle, DriveCommand, HazardMaps, StopReason};
 use sightline_track::trace::StepTrace;
 use sightline_world::World;
+use sightline_world::scenario::Fault;
 use sightline_world::target_truth::{TargetTruth, TruthSource};
 
 /// Who drives in a session, and how: the run on whose estimates the rover moves, and its command.
@@ -56,6 +57,9 @@ pub struct DriveView {
     /// The visits that have ended, of a drive to several targets.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub visits: Vec<Visit>,
+    /// The faults that were injected into the world.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub faults: Vec<Fault>,
     /// The outcome so far, for the present target; null before the first command.
     pub summary: Option<DriveSummary>,
     /// Why the drive stopped; null while it goes on, and where it has arrived.
@@ -85,7 +89,8 @@ impl DriveView {
         let paused = goes_on.then(halted).flatten();
         let why = explained.of(world.traverse(), &steering.command, run.whole_steps(), &cycles, maps);
         let (steering, summary) = (Some(steering.clone()), Some(summary));
-        Self { steering, cycles, visits: Vec::new(), summary, why, is_driving, paused }
+        let faults = world.faults().to_vec();
+        Self { steering, cycles, visits: Vec::new(), faults, summary, why, is_driving, paused }
     }
 }
 

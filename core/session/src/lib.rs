@@ -22,6 +22,7 @@ pub mod track;
 pub mod driving;
 pub mod targeted_drive;
 pub mod visits;
+pub mod faults;
 pub mod hazard_view;
 pub mod pause;
 pub mod view;

@@ -265,7 +265,7 @@ fn a_drive_to_a_target_of_the_pancams_points_the_mast_for_the_main_pair() {
         assert!(left.project(&predicted).unwrap().distance(left.centre_pixel()) < 1e-6);
     }
     // A branch takes the images along.
-    let branch = drive.world.branch(2, &folder.path().join("b"), Cancel::default()).unwrap();
+    let branch = drive.world.branch(2, &[], &folder.path().join("b"), Cancel::default()).unwrap();
     assert!(branch.traverse().is_rendered(1, Some(name("pancam"))));
     // Another state forgets them.
     let first = drive.world.state()[..1].to_vec();

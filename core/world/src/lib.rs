@@ -65,6 +65,7 @@ pub mod library;
 #[cfg(test)]
 mod tests;
 
+pub use camera::dust::add_dust;
 pub use camera::ghost::add_ghosts;
 pub use camera::picture::{Eye, NoiseSeed, Region};
 pub use camera::render::{clean_radiance, develop, develop_until, render};

@@ -22,7 +22,7 @@ use crate::rover::body::{BodyPart, parts};
 use crate::rover::drive::true_drive;
 use crate::rover::suspension::settle;
 use crate::rover::tracks::Tracks;
-use crate::scenario::{EventSettings, Fiducial, Occluder, Scenario, SunSettings};
+use crate::scenario::{EventSettings, Fault, FaultKind, Fiducial, Occluder, Scenario, SunSettings};
 use crate::solids::{Look, Shape, Solid, SolidKind};
 use crate::traverse::{Stop, WheelPlaces};
 use crate::world::World;
@@ -35,6 +35,11 @@ const OCCLUDER_ALBEDO: f32 = 0.25;
 const ROVER_ALBEDO: f32 = 0.4;
 /// Half the thickness of boards and occluders, m.
 const HALF_THICKNESS_M: f64 = 0.005;
+/// Width and height of the block of an injected occluder, and of the one that shades a target, m.
+const FAULT_OCCLUDER_M: f64 = 0.6;
+const FAULT_SHADE_M: f64 = 0.8;
+/// Distance of the latter from the target, m.
+const FAULT_SHADE_AWAY_M: f64 = 2.0;
 /// The sun is not let below this elevation, deg: where the light of a scenario is defined.
 const LOWEST_SUN_DEG: f64 = 5.0;
 
@@ -85,6 +90,10 @@ impl World {
         }
         let present = events.occluders.iter().filter(|o| covers(o.from_stop, o.to_stop, moment.stop));
         solids.extend(present.map(|o| occluder(o, &moment.left_camera, &self.targets_centre())));
+        let faults = events.faults.iter().filter(|fault| fault.covers(moment.stop));
+        solids.extend(
+            faults.filter_map(|fault| of_fault(fault, moment, &light.to_sun, &self.targets_centre())),
+        );
         let imprint = self.imprint_at(moment, scenario);
         Self { scenery: Arc::clone(&self.scenery), light, sun_grid, solids, imprint, exposure: self.exposure }
     }
@@ -152,6 +161,35 @@ fn occluder(settings: &Occluder, left_camera: &Point3, targets_centre: &Point3) 
         ]),
         look: Look::Plain(OCCLUDER_ALBEDO),
         is_seen: true,
+    }
+}
+
+/// The block of an injected fault: before the target, or between it and the sun, where only its shadow is seen.
+fn of_fault(fault: &Fault, moment: &Moment, to_sun: &Vector3, targets_centre: &Point3) -> Option<Solid> {
+    let target = fault.target_m.map_or(*targets_centre, Point3::from);
+    match fault.kind {
+        FaultKind::Occluder => {
+            let (from_stop, to_stop, at, aside_m) = (fault.from_stop, fault.to_stop, 1.0 / 3.0, 0.0);
+            let (width_m, height_m) = (FAULT_OCCLUDER_M, FAULT_OCCLUDER_M);
+            let block = Occluder { from_stop, to_stop, at, width_m, height_m, aside_m };
+            Some(occluder(&block, &moment.left_camera, &target))
+        }
+        FaultKind::Shadow => {
+            let across = to_sun.cross(&Vector3::z()).normalize();
+            let half_m = 0.5 * FAULT_SHADE_M;
+            Some(Solid {
+                kind: SolidKind::Occluder,
+                middle: target + FAULT_SHADE_AWAY_M * to_sun,
+                shape: Shape::Box([
+                    HALF_THICKNESS_M * to_sun,
+                    half_m * across,
+                    half_m * to_sun.cross(&across),
+                ]),
+                look: Look::Plain(OCCLUDER_ALBEDO),
+                is_seen: false,
+            })
+        }
+        FaultKind::FeatureStarvation | FaultKind::PoseJump | FaultKind::CameraDropOut => None,
     }
 }
 

@@ -10,7 +10,7 @@ use sightline_geometry::error::{Error, Result};
 use sightline_rover::driving::{DriveCommand, GoalRule};
 
 use super::worlds::Worlds;
-use sightline_server::cli::drive::NavigatorName;
+use sightline_server::cli::drive_options::NavigatorName;
 use sightline_server::cli::open;
 use sightline_server::cli::terminal::{self, Progress};
 

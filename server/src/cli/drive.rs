@@ -16,11 +16,10 @@ use sightline_geometry::frames::Pixel;
 use sightline_recordings::replayed::Answer;
 use sightline_recordings::{DrivenTraverse, Traverse};
 use sightline_rover::driving::{
-    ArrivalAction, Cycle, DriveCommand, GoalRule, NavigatorKind, OdometryPair, PathChoice, SlipCheck,
-    TrackedStops,
+    ArrivalAction, Cycle, DriveCommand, GoalRule, OdometryPair, PathChoice, SlipCheck, TrackedStops,
 };
-use sightline_rover::visual_odometry::OdometryMode;
 use sightline_session::driving::DriveSummary;
+use sightline_session::faults::{self, NewFault};
 use sightline_session::replayed_drive::{ReplaySummary, ReplayedDrive};
 use sightline_session::step::RunStep;
 use sightline_session::stop_cause::StopExplanation;
@@ -31,6 +30,7 @@ use sightline_track::settings::{Changes, Settings, parse_assignment};
 use sightline_track::target::Designation;
 use sightline_world::choose_targets;
 
+use super::drive_options::{NavigatorName, Odometry, OnArrival, Pairs, SlipOf, Tracked};
 use super::study_odometry::Configuration;
 use super::terminal::{self, Progress};
 use super::track::{pixel, without_images};
@@ -109,6 +109,10 @@ pub(super) struct Drive {
     /// An action after arrival; can be given more than once.
     #[arg(long, value_name = "ACTION")]
     on_arrival: Vec<OnArrival>,
+    /// A fault to inject: occluder, shadow, feature_starvation, pose_jump or camera_drop_out, its first and last stop, and, for the
+    /// first two, the target it concerns, from 0: for example occluder:5-7 or shadow:8-9@1; can be given more than once.
+    #[arg(long, value_name = "KIND:FROM-TO[@TARGET]", value_parser = super::fault::parse)]
+    fault: Vec<NewFault>,
     /// Another seed than the scenario's.
     #[arg(long)]
     seed: Option<u64>,
@@ -127,83 +131,6 @@ pub(super) struct Drive {
     /// How the stops are written.
     #[arg(long, default_value = "jsonl")]
     format: Format,
-}
-
-/// An action after arrival.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum OnArrival {
-    /// Point the mast at the target, take another pair and locate the target in it.
-    Look,
-}
-
-/// What visual odometry is used for.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Odometry {
-    /// It does not run: the pose is that of wheels, gyro and accelerometers.
-    Off,
-    /// It measures the slip, which may end the drive; the pose is that of wheels, gyro and accelerometers.
-    SlipCheck,
-    /// Accepted updates correct the pose as well.
-    Full,
-}
-
-/// The motion that the measured one is compared with.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum SlipOf {
-    /// What the wheels have driven.
-    Wheels,
-    /// The whole command, also where the time ended the motion early.
-    Command,
-}
-
-/// The pairs in which vision measures the motion.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Pairs {
-    /// Those of the tracker; where an update is refused, also pairs that look back.
-    Shared,
-    /// Pairs of its own at every stop, ahead, and back once an update is refused.
-    Own,
-}
-
-/// The navigator that chooses the motions.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum NavigatorName {
-    /// The arc or turn to the goal, without a hazard map.
-    Arcs,
-    /// Avoids hazards: votes of hazard, goal and steering.
-    Gestalt,
-    /// Avoids hazards: goodness and certainty integrated under the path.
-    Morphin,
-}
-
-/// The stops at which the target is tracked.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Tracked {
-    /// Every stop.
-    Every,
-    /// After each step of --step-fraction and after each turn; odometry runs alone at the intermediate stops.
-    ByDistance,
-}
-
-impl Odometry {
-    const fn mode(self) -> OdometryMode {
-        match self {
-            Self::Off => OdometryMode::Off,
-            Self::SlipCheck => OdometryMode::SlipCheck,
-            Self::Full => OdometryMode::Full,
-        }
-    }
-}
-
-impl NavigatorName {
-    /// The navigator of a command.
-    pub const fn kind(self) -> NavigatorKind {
-        match self {
-            Self::Arcs => NavigatorKind::Arcs,
-            Self::Gestalt => NavigatorKind::Gestalt,
-            Self::Morphin => NavigatorKind::Morphin,
-        }
-    }
 }
 
 /// How the stops are written.
@@ -280,7 +207,8 @@ impl Drive {
         self.command().validate()?;
         let temporary =
             tempfile::tempdir().map_err(|source| Error::Write { path: std::env::temp_dir(), source })?;
-        let folder = self.out.clone().unwrap_or_else(|| temporary.path().join("drive"));
+        let plain = || temporary.path().join("drive");
+        let folder = self.out.clone().filter(|_| self.fault.is_empty()).unwrap_or_else(plain);
         let world = DrivenTraverse::begin(&scenario, &folder, Cancel::default())?;
         if self.list_targets {
             let traverse = world.traverse();
@@ -295,6 +223,15 @@ impl Drive {
         }
         let designated = |pixel: &Pixel| Designation { step: 0, pixel: *pixel, camera: self.camera };
         let targets: Vec<Designation> = self.target.iter().map(designated).collect();
+        let world = if self.fault.is_empty() {
+            world
+        } else {
+            let faulty = temporary.path().join("faulty");
+            let folder = self.out.as_ref().map_or(faulty, |out| out.clone());
+            let designation = |number: usize| targets.get(number).copied();
+            let faults = faults::placed(world.traverse(), &self.fault, designation, 0)?;
+            world.branch(1, &faults, &folder, Cancel::default())?
+        };
         let drive = TargetedDrive::begin_to(world, &targets, self.command(), &settings, Cancel::default())?;
         follow(drive, &settings)
     }
@@ -306,6 +243,7 @@ impl Drive {
             ("--world", !self.world.is_empty()),
             ("--out", self.out.is_some()),
             ("--list-targets", self.list_targets),
+            ("--fault", !self.fault.is_empty()),
         ];
         if let Some((option, _)) = without_effect.iter().find(|(_, is_given)| *is_given) {
             let problem = format!("{option} has no effect on a recording; leave it out or give a scenario");

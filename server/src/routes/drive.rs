@@ -15,10 +15,12 @@ use sightline_api::location::{AtDriveStop, AtSession};
 use sightline_api::wire::NewDrive;
 use sightline_recordings::DrivenTraverse;
 use sightline_session::driving::{DriveView, Steering};
+use sightline_session::faults;
 use sightline_session::hazard_view::HazardView;
 use sightline_session::view::{SavedSession, SavedTarget, SessionView};
 use sightline_session::visits::Visit;
 use sightline_session::{Cursor, Fork, Session};
+use sightline_world::scenario::Fault;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
@@ -144,8 +146,13 @@ fn add(
                 .hint("Designate it at that stop or an earlier one, or leave it out."));
         }
     }
+    let known = |number: usize| {
+        let target = saved.targets.get(number).filter(|target| !target.removed);
+        target.map(|target| target.designation)
+    };
+    let faults = faults::placed(&open.traverse, &new.faults, known, target)?;
     let folder = driven::new_folder(state.folders(), &open.traverse.index().name)?;
-    let made = world(&open, from_step, &folder, cancel).and_then(|world| {
+    let made = world(&open, from_step, &faults, &folder, cancel).and_then(|world| {
         state.limits().check_drive(world.traverse())?;
         let opened = driven::open(world, state.cache(), state.events())?;
         Ok(state.add_traverse(Arc::new(opened))?)
@@ -184,16 +191,18 @@ fn from_step(open: &OpenTraverse, new: &NewDrive, designated: usize, last: usize
 fn world(
     open: &OpenTraverse,
     from_step: usize,
+    faults: &[Fault],
     folder: &std::path::Path,
     cancel: &CancelFlag,
 ) -> ApiResult<DrivenTraverse> {
     if let Some(driven) = &open.driven {
-        return Ok(driven.with(|world| world.branch(from_step + 1, folder, cancel.as_ref().into()))?);
+        return Ok(driven.with(|world| world.branch(from_step + 1, faults, folder, cancel.as_ref().into()))?);
     }
-    let scenario = scenario_of(&open.traverse).ok_or_else(|| {
+    let mut scenario = scenario_of(&open.traverse).ok_or_else(|| {
         ApiError::conflict("A recorded drive cannot be driven.")
             .hint("Open a scenario: the world must be simulated.")
     })?;
+    scenario.events.faults.extend_from_slice(faults);
     Ok(DrivenTraverse::begin(&scenario, folder, cancel.as_ref().into())?)
 }
 

@@ -1,5 +1,6 @@
 //! Driving on commands: the form of the command, the drive as the server has it, and the panel that shows both.
 
+pub(crate) mod faults;
 pub(crate) mod hazards;
 pub(crate) mod map;
 pub(crate) mod panel;
@@ -11,6 +12,7 @@ pub(crate) mod visits;
 pub(crate) mod why;
 pub(crate) mod words;
 
+use sightline_session::faults::NewFault;
 use sightline_rover::driving::DriveCommand;
 use sightline_session::driving::DriveView;
 
@@ -21,6 +23,8 @@ pub struct Driving {
     pub command: DriveCommand,
     /// The targets to which the rover drives afterwards, as they stand in the form, by their numbers.
     pub then: Vec<usize>,
+    /// The faults to be injected into the next drive or branch.
+    pub faults: Vec<NewFault>,
     /// The pause as it stands in the form.
     pub pause: pause::PauseForm,
     /// The drive with the name of its session; `None` before it was read.
@@ -39,6 +43,8 @@ pub enum Ask {
     Form(DriveCommand),
     /// Changes the targets that are visited afterwards.
     Then(Vec<usize>),
+    /// Changes the faults to be injected into the next drive or branch.
+    Faults(Vec<NewFault>),
     /// Begins a drive with the run that is looked at: from the first stop, or as a branch at the cursor's stop.
     Begin,
     /// Changes the pause in the form.

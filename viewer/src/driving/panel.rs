@@ -10,7 +10,7 @@ use sightline_session::pause::PauseSide;
 use sightline_track::cycle_stage::CycleStage;
 
 use crate::command::{Command, Go};
-use crate::driving::{Ask, pause, visits, why, words};
+use crate::driving::{Ask, faults, pause, visits, why, words};
 use crate::panels::digits;
 use crate::panels::panel::Panel;
 use crate::state::{State, run_letter};
@@ -37,12 +37,14 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ScrollArea::both().auto_shrink(false).show(ui, |ui| {
         form(ui, state, out);
         visits::form(ui, state, out);
+        faults::form(ui, state, out);
         match state.drive().filter(|_| state.is_on_commands()) {
             Some(drive) => {
                 pause_form(ui, state, out);
                 buttons(ui, state, drive, out);
                 standing(ui, drive);
                 visits::list(ui, state, drive);
+                faults::list(ui, &drive.faults);
                 if let Some(why) = &drive.why {
                     why::headline(ui, why, out);
                 }

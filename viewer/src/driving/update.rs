@@ -127,6 +127,7 @@ impl State {
         match ask {
             Ask::Form(command) => self.driving.command = command,
             Ask::Then(then) => self.driving.then = then,
+            Ask::Faults(faults) => self.driving.faults = faults,
             Ask::PauseForm(form) => self.driving.pause = form,
             Ask::Begin => self.begin_drive(),
             Ask::Pause => {
@@ -193,6 +194,7 @@ impl State {
         let new = NewDrive {
             command: steering.command,
             then: steering.then,
+            faults: self.driving.faults.clone(),
             from_step,
             pause_at: None,
             pause: None,
@@ -205,6 +207,7 @@ impl State {
             call,
             |state, view| {
                 state.driving.is_beginning = false;
+                state.driving.faults.clear();
                 state.messages.note(
                     "The rover drives in a session of its own; the one from which it began is as it was.",
                 );

@@ -44,7 +44,13 @@ pub fn run(
 ) -> Result<()> {
     let stops = world.stops();
     let has_stayed = stops.site_from_rover(step) == stops.site_from_rover(step - 1);
-    if command.odometry == OdometryMode::Off || has_stayed || stops.measured_motion(step).is_some() {
+    // Without images the pose stays that of wheels, gyro and accelerometers.
+    let is_blind = [step - 1, step].into_iter().any(|step| stops.has_dropped_out(step));
+    if command.odometry == OdometryMode::Off
+        || has_stayed
+        || is_blind
+        || stops.measured_motion(step).is_some()
+    {
         return Ok(());
     }
     let measured = match command.odometry_pair {

@@ -4,14 +4,15 @@
 //! |---|---|---|
 //! | 1 | a jump of heading or position | `jump`: no earlier step changes like that, and the target leaves the search window |
 //! | 2 | an earlier loss | bad updates in a row, without a jump of the pose since |
-//! | 3 | nothing was matched | the reason of the tracker |
-//! | 4 | slip measured by vision | `odometry`: the pose used is significantly elsewhere |
-//! | 5 | no contrast | nearly all positions are flat |
-//! | 6 | a search window that is too small | a poor score that rises towards its rim |
-//! | 7 | a hidden or changed target | the score fell in one step, prediction and change of pose being consistent |
-//! | 8 | the right image | a good match, a poor stereo score |
-//! | 9 | slip, or a match or range on another surface | a good match, range or site position beyond its tolerance |
-//! | 10 | an ambiguous match | a good match, a second peak beyond its gate |
+//! | 3 | the target leaves an image | the template does not fit around the prediction |
+//! | 4 | nothing was matched | the reason of the tracker |
+//! | 5 | slip measured by vision | `odometry`: the pose used is significantly elsewhere |
+//! | 6 | no contrast | nearly all positions are flat |
+//! | 7 | a search window that is too small | a poor score that rises towards its rim |
+//! | 8 | a hidden or changed target | the score fell in one step, prediction and change of pose being consistent |
+//! | 9 | the right image | a good match, a poor stereo score |
+//! | 10 | slip, or a match or range on another surface | a good match, range or site position beyond its tolerance |
+//! | 11 | an ambiguous match | a good match, a second peak beyond its gate |
 
 use sightline_track::locate::template::match_template::TemplateMatch;
 use sightline_track::settings::TrackerKind;
@@ -22,7 +23,7 @@ use super::jump::{self, Jump, Jumped};
 use super::sentence::AT_RIM_PX;
 use super::template::edge_distance_px;
 use super::words::{number, signed};
-use super::{Book, odometry};
+use super::{Book, leaving, odometry};
 use crate::metrics::uncertainty::nis;
 
 /// The headline without a cause.
@@ -77,7 +78,8 @@ pub(super) fn find(book: &Book<'_>, verdict: &Verdict) -> Option<Cause> {
     let by_template = book.settings.tracker == TrackerKind::Template;
     let found =
         by_template.then(|| jump::find(book, rejected_before)).flatten().map(|jump| of_jump(book, jump));
-    let found = found.or_else(|| earlier(rejected_before)).or_else(|| nothing_matched(book));
+    let found = found.or_else(|| earlier(rejected_before));
+    let found = found.or_else(|| leaving::sentence(book).map(Cause::new)).or_else(|| nothing_matched(book));
     let found = found.or_else(|| odometry::disagreement(book.trace).map(Cause::slip));
     found.or_else(|| of_match(book, verdict))
 }

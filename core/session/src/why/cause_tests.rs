@@ -12,6 +12,8 @@ use sightline_track::target::Designation;
 
 /// The stop at which something goes wrong.
 const STEP: usize = 4;
+/// A turn per step that brings the target to the edge of the right image at that stop, deg.
+const TURN_DEG: f64 = 2.0;
 
 fn poses() -> Vec<Pose> {
     (0..6).map(|stop| Pose::translation(0.4 * f64::from(stop), 0.0, 0.0)).collect()
@@ -116,6 +118,26 @@ fn a_covered_target_is_named_as_a_window_without_contrast() {
     world.troubles[STEP + 1] = Trouble::Covered;
     let summary = summary_at(&world, STEP + 1, &[]);
     assert!(summary.headline.starts_with("The target was lost at the update before"), "{summary:?}");
+}
+
+#[test]
+fn a_target_that_leaves_an_image_is_named_with_the_edge() {
+    // A steady turn to the right carries the target to the left edge, which it reaches in the right image first or later.
+    let turning = |deg: f64| {
+        let mut world = PlaneWorld::new(poses());
+        for stop in 0..6 {
+            let turned = turned(&poses()[stop], deg * stop as f64);
+            (world.true_poses[stop], world.estimates[stop]) = (turned, turned);
+        }
+        world
+    };
+    let left = summary_at(&turning(TURN_DEG), STEP, &[]);
+    assert!(
+        left.headline.starts_with("The target leaves the") && left.headline.contains("px from the left edge"),
+        "{left:?}"
+    );
+    let gone = summary_at(&turning(TURN_DEG), STEP + 1, &[]);
+    assert!(gone.headline.starts_with("The target was lost at the update before"), "{gone:?}");
 }
 
 #[test]

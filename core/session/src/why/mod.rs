@@ -24,6 +24,7 @@
 mod cause;
 pub mod gates;
 mod jump;
+mod leaving;
 mod limits;
 mod node;
 pub(crate) mod odometry;

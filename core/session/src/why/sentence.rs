@@ -16,6 +16,8 @@ use sightline_track::locate::Evidence;
 use sightline_track::settings::Settings;
 use sightline_track::stages::judge::{Gate, Verdict};
 use sightline_track::target::TrackingState;
+use sightline_vision::image::PixelRect;
+use sightline_world::target_truth::TruthKind;
 
 /// A peak so near to the rim may belong to one beyond it, px.
 pub(super) const AT_RIM_PX: f64 = 3.0;
@@ -170,11 +172,23 @@ fn prediction_words(trace: &RunStep, settings: &Settings, accepted: bool) -> Opt
     if let Some(truth) = trace.truth.as_ref().and_then(|truth| truth.left_pixel) {
         let off = format!("the prediction is {} px from the truth", number(predicted.distance(truth)));
         let is_outside = jump::is_outside(trace, settings.template.template_size_px, truth);
-        let beyond = "which is outside the search window";
+        let is_cut = template.is_some_and(|matched| is_cut(trace, matched.search_window));
+        let cut = if is_cut { ", which the edge of the image cuts off" } else { "" };
+        let beyond = format!("which is outside the search window{cut}");
         return Some(if is_outside == Some(true) { format!("{off}, {beyond}") } else { off });
     }
     let matched: Pixel = template?.pixel;
     Some(format!("the match is {} px from the prediction", number(predicted.distance(matched))))
+}
+
+/// Whether a search window ends at an edge of the left image.
+fn is_cut(trace: &RunStep, window: PixelRect) -> bool {
+    let [width, height] = trace.point_mast.left.size;
+    let end = |from: i32, length: u32| i64::from(from) + i64::from(length);
+    window.x <= 0
+        || window.y <= 0
+        || end(window.x, window.width) >= i64::from(width)
+        || end(window.y, window.height) >= i64::from(height)
 }
 
 /// That it was lost before already.
@@ -196,12 +210,21 @@ fn truth_words(trace: &RunStep, verdict: &Verdict) -> Option<String> {
     let truth = trace.truth.as_ref()?;
     let (err_px, tolerance_px) = (truth.err_px?, truth.tolerance_px);
     let [err, tolerance] = told_apart(err_px, tolerance_px);
+    let from = match truth.kind {
+        TruthKind::Surface => "the truth",
+        TruthKind::Carried => "the first estimate carried by the true poses",
+    };
     match (verdict.accepted, err_px <= tolerance_px) {
         (true, false) => {
-            Some(format!("FALSE tracking: the match is {err} px from the truth (tolerance {tolerance} px)."))
+            // An error of the designation itself is carried along.
+            let claim = match truth.kind {
+                TruthKind::Surface => "FALSE tracking",
+                TruthKind::Carried => "FALSE tracking, or an inaccurate first estimate",
+            };
+            Some(format!("{claim}: the match is {err} px from {from} (tolerance {tolerance} px)."))
         }
-        (false, true) => Some(format!("False loss: the match is right, {err} px from the truth.")),
-        (false, false) => Some(format!("Correct rejection: the match is {err} px from the truth.")),
+        (false, true) => Some(format!("False loss: the match is right, {err} px from {from}.")),
+        (false, false) => Some(format!("Correct rejection: the match is {err} px from {from}.")),
         (true, true) => None,
     }
 }

@@ -7,5 +7,6 @@ mod shading;
 pub(crate) mod optics;
 pub mod render;
 pub mod exposure;
+pub(crate) mod dust;
 pub(crate) mod ghost;
 pub(crate) mod noise;

@@ -33,10 +33,20 @@ use sightline_geometry::odometry_error::OdometryError;
 
 use crate::ground::texture::mix;
 use crate::rover::scene::{Leg, TrueDrive};
-use crate::scenario::{HeadingJump, OdometryModel, RoverSettings, Scenario};
+use crate::scenario::{FaultKind, HeadingJump, OdometryModel, RoverSettings, Scenario};
 
 /// Seconds of an hour.
 const HOUR_S: f64 = 3600.0;
+
+/// Turn of the estimated heading by an injected fault, clockwise from above, deg.
+const FAULT_JUMP_DEG: f64 = 7.0;
+
+/// The jumps of the estimated heading: those of the scenario, and those of injected faults.
+fn heading_jumps(scenario: &Scenario) -> Vec<HeadingJump> {
+    let injected = scenario.events.faults.iter().filter(|fault| fault.kind == FaultKind::PoseJump);
+    let injected = injected.map(|fault| HeadingJump { stop: fault.from_stop, yaw_deg: FAULT_JUMP_DEG });
+    scenario.rover.heading_jumps.iter().copied().chain(injected).collect()
+}
 
 /// The pose estimates of a scenario's drive, one for each stop.
 pub fn believed(drive: &TrueDrive, scenario: &Scenario) -> Vec<Pose> {
@@ -49,10 +59,11 @@ pub fn believed(drive: &TrueDrive, scenario: &Scenario) -> Vec<Pose> {
             wheels_and_imu(drive, &scenario.odometry_error, &scenario.rover, scenario.seed)
         }
     };
-    if scenario.rover.heading_jumps.is_empty() {
+    let jumps = heading_jumps(scenario);
+    if jumps.is_empty() {
         return believed;
     }
-    with_heading_jumps(&believed, &scenario.rover.heading_jumps)
+    with_heading_jumps(&believed, &jumps)
 }
 
 /// The estimates with their heading turned from some stops on.
@@ -130,7 +141,7 @@ impl Belief {
                 Self { pose, attitude_error_rad: [believed.roll, believed.pitch, believed.yaw] }
             }
         };
-        for jump in scenario.rover.heading_jumps.iter().filter(|jump| jump.stop as usize == number) {
+        for jump in heading_jumps(scenario).iter().filter(|jump| jump.stop as usize == number) {
             after.pose *= attitude_from_roll_pitch_yaw(0.0, 0.0, jump.yaw_deg.to_radians());
         }
         after

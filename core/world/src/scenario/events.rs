@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::faults::{Fault, FaultKind};
 use super::range::within;
 use sightline_geometry::camera::CameraName;
 use sightline_geometry::error::{Error, Result};
@@ -26,6 +27,9 @@ pub struct EventSettings {
     /// Reflections in the lenses of further pairs, in which stereo sees a surface that does not exist.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub ghosts: Vec<Ghost>,
+    /// Faults that a person injected into the drive.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub faults: Vec<Fault>,
 }
 
 /// A cloud before the sun, from one stop to another.
@@ -92,6 +96,17 @@ fn bright() -> f64 {
 }
 
 impl EventSettings {
+    /// Whether a fault of a kind was injected at a stop.
+    pub fn has_fault(&self, kind: FaultKind, stop: u32) -> bool {
+        self.faults.iter().any(|fault| fault.kind == kind && fault.covers(stop))
+    }
+
+    /// Whether something stands in the way at some stop.
+    pub fn has_occluders(&self) -> bool {
+        let is_occluder = |fault: &Fault| fault.kind == FaultKind::Occluder;
+        !self.occluders.is_empty() || self.faults.iter().any(is_occluder)
+    }
+
     pub(crate) fn validate(&self) -> Result<()> {
         within("events.sun_azimuth_deg_per_h", self.sun_azimuth_deg_per_h, -360.0, 360.0)?;
         within("events.sun_elevation_deg_per_h", self.sun_elevation_deg_per_h, -90.0, 90.0)?;
@@ -118,11 +133,12 @@ impl EventSettings {
             within(&key("height_m"), ghost.height_m, 0.05, 10.0)?;
             within(&key("brightness"), ghost.brightness, 0.0, 10.0)?;
         }
+        self.faults.iter().enumerate().try_for_each(|(index, fault)| fault.validate(index))?;
         Ok(())
     }
 }
 
-fn in_order(key: &str, from_stop: u32, to_stop: u32) -> Result<()> {
+pub(super) fn in_order(key: &str, from_stop: u32, to_stop: u32) -> Result<()> {
     if to_stop >= from_stop {
         return Ok(());
     }

@@ -14,6 +14,7 @@
 mod camera;
 mod drive;
 mod events;
+mod faults;
 mod fiducials;
 mod ground;
 mod light;
@@ -31,6 +32,7 @@ pub use camera::{
 };
 pub use drive::{Course, DriveSettings, Move};
 pub use events::{Cloud, EventSettings, Ghost, Occluder};
+pub use faults::{Fault, FaultKind};
 pub use fiducials::Fiducial;
 pub use ground::{ClearPath, PlacedRock, RockSettings, RockShape, TerrainSettings, TextureSettings};
 pub use light::{Reflectance, SunSettings};

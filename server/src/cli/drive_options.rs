@@ -1,0 +1,82 @@
+//! The choices of `sightline drive`.
+
+use clap::ValueEnum;
+use sightline_rover::driving::NavigatorKind;
+use sightline_rover::visual_odometry::OdometryMode;
+
+/// An action after arrival.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(super) enum OnArrival {
+    /// Point the mast at the target, take another pair and locate the target in it.
+    Look,
+}
+
+/// What visual odometry is used for.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(super) enum Odometry {
+    /// It does not run: the pose is that of wheels, gyro and accelerometers.
+    Off,
+    /// It measures the slip, which may end the drive; the pose is that of wheels, gyro and accelerometers.
+    SlipCheck,
+    /// Accepted updates correct the pose as well.
+    Full,
+}
+
+/// The motion that the measured one is compared with.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(super) enum SlipOf {
+    /// What the wheels have driven.
+    Wheels,
+    /// The whole command, also where the time ended the motion early.
+    Command,
+}
+
+/// The pairs in which vision measures the motion.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(super) enum Pairs {
+    /// Those of the tracker; where an update is refused, also pairs that look back.
+    Shared,
+    /// Pairs of its own at every stop, ahead, and back once an update is refused.
+    Own,
+}
+
+/// The navigator that chooses the motions.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum NavigatorName {
+    /// The arc or turn to the goal, without a hazard map.
+    Arcs,
+    /// Avoids hazards: votes of hazard, goal and steering.
+    Gestalt,
+    /// Avoids hazards: goodness and certainty integrated under the path.
+    Morphin,
+}
+
+/// The stops at which the target is tracked.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(super) enum Tracked {
+    /// Every stop.
+    Every,
+    /// After each step of --step-fraction and after each turn; odometry runs alone at the intermediate stops.
+    ByDistance,
+}
+
+impl Odometry {
+    pub(super) const fn mode(self) -> OdometryMode {
+        match self {
+            Self::Off => OdometryMode::Off,
+            Self::SlipCheck => OdometryMode::SlipCheck,
+            Self::Full => OdometryMode::Full,
+        }
+    }
+}
+
+impl NavigatorName {
+    /// The navigator of a command.
+    pub const fn kind(self) -> NavigatorKind {
+        match self {
+            Self::Arcs => NavigatorKind::Arcs,
+            Self::Gestalt => NavigatorKind::Gestalt,
+            Self::Morphin => NavigatorKind::Morphin,
+        }
+    }
+}

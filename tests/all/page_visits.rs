@@ -1,0 +1,45 @@
+//! A drive to two targets in a real browser: both are chosen on the page, a fault is injected, and the page says how each visit
+//! ended.
+
+use sightline_geometry::frames::Pixel;
+use sightline_tests::bench::{picked, place};
+use sightline_tests::scenario::several_targets;
+
+/// A rock beside that of the first target, px of the first left image.
+const SECOND: Pixel = Pixel::new(319.0, 243.0);
+
+#[tokio::test(flavor = "multi_thread")]
+async fn two_targets_are_visited_in_turn_and_a_hidden_one_is_dropped() {
+    let (bench, browser) = picked(&several_targets()).await;
+    browser.resize(1600, 1200).await;
+    browser.go_to("0", 0).await;
+    let (x, y) = place(&browser, SECOND).await;
+    browser.press("t").await;
+    browser.wait_status("pick mode", "s.pick_mode").await;
+    browser.click(x, y).await;
+    browser.wait_status("the target, or advice", "s.target === 1 || s.advised_against").await;
+    if browser.status().await["target"] != 1 {
+        browser.click_on("button", "Pick anyway").await;
+    }
+    browser.wait_status("the second target", "s.target === 1 && !s.running").await;
+    // The first target is driven to first.
+    browser.click_on("button", "target 1").await;
+    browser.wait_status("the first target", "s.target === 0").await;
+    browser.show_panel("Drive").await;
+    browser.click_on("checkbox", "then visit target 2").await;
+    browser.click_on("button", "inject faults").await;
+    browser.click_on("button", "Add a fault").await;
+    browser.says("from stop 1").await;
+    browser.shot("visits-form").await;
+    browser.click_on("button", "Drive").await;
+    browser.wait_status("the drive", "s.session === 's2'").await;
+    browser.says("injected faults: occluder at stops 1 to 3").await;
+    browser.says("target 1: dropped, target lost at stop 3").await;
+    browser.wait_status("the end", "s.drive !== 'drives' && s.drive !== 'waits' && s.target === 1").await;
+    browser.says("target 2: ").await;
+    browser.shot("visits").await;
+    let drive = bench.json("/api/v1/sessions/s2/drive");
+    let visits = drive["visits"].as_array().unwrap();
+    assert_eq!((visits.len(), &visits[0]["reason"]), (2, &serde_json::json!("lost")), "{drive}");
+    browser.end().await;
+}
