@@ -8,6 +8,7 @@
 //! by_pose     why targets are lost, odometry   terrain_table   Table II
 //! wire        what page and server say to each other about studies
 //! randomised  approaches that the seed draws
+//! odometry    visual odometry in drives  drive_grid  drives on commands over slope, rocks, odometry, navigator
 //! ```
 
 pub mod calibration;
@@ -31,4 +32,5 @@ pub mod terrain_table;
 mod spread;
 pub mod row;
 pub mod odometry;
+pub mod drive_grid;
 pub mod wire;

@@ -19,6 +19,11 @@ use sightline_world::Scenario;
 /// Digest of the sources that decide a result, from the build script.
 const SOURCES: &str = env!("SIGHTLINE_STUDY_SOURCES");
 
+/// Key of the code that decides a result.
+pub fn code_key() -> String {
+    SOURCES[..16].to_owned()
+}
+
 /// The most configurations of a study.
 const CONFIGURATION_LIMIT: usize = 32;
 

@@ -13,6 +13,7 @@ use sightline_study::row::Row;
 use sightline_study::terrain_table;
 
 use super::open;
+use super::study_drive_grid::DriveGridStudy;
 use super::study_odometry::OdometryStudy;
 use super::terminal::{self, Progress};
 use crate::jobs::lock;
@@ -63,6 +64,8 @@ enum Experiment {
     Recovery(Experimental),
     /// Visual odometry: how often it converges, how often it is silently wrong, and how it drifts.
     Odometry(OdometryStudy),
+    /// Drives on commands over slope, rock coverage, use of visual odometry and navigator: which arrive, and why others do not.
+    DriveGrid(DriveGridStudy),
 }
 
 /// Arguments of a study over worlds, configurations and a grid.
@@ -135,6 +138,7 @@ impl Study {
             Experiment::FeatureFaults(arguments) => arguments.run("feature-faults"),
             Experiment::Recovery(arguments) => arguments.run("recovery"),
             Experiment::Odometry(arguments) => arguments.run(),
+            Experiment::DriveGrid(arguments) => arguments.run(),
         }
     }
 }
