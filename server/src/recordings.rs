@@ -167,5 +167,11 @@ pub(crate) fn contents(
 
 /// The problem of a recording that cannot be opened.
 pub(crate) fn refusal(error: sightline_geometry::error::Error) -> ApiError {
-    ApiError::from(error).hint("Mend the file that is named, or choose another folder; nothing was imported.")
+    let error = ApiError::from(error);
+    let is_unknown = error.problem().detail.contains("is of no known format");
+    error.hint(if is_unknown {
+        "Choose the folder that holds all of this, perhaps the one above; nothing was imported."
+    } else {
+        "Mend the file that is named, or choose another folder; nothing was imported."
+    })
 }

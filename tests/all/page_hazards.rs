@@ -44,5 +44,15 @@ async fn the_page_shows_ground_paths_and_votes_of_a_drive_that_avoids_a_rock() {
     browser.says("paths are not vetoed").await;
     browser.says("(chosen)").await;
     browser.shot("hazards").await;
+
+    // The drive goes on round the rock, to 2 m from the target.
+    browser.show_panel("Drive").await;
+    browser.click_on("button", "Drive on").await;
+    browser.wait_status("the arrival", "s.drive === 'arrived'").await;
+    browser.says("arrived: ").await;
+    browser.shot("hazards-arrived").await;
+    let summary = bench.json("/api/v1/sessions/s2/drive")["summary"].clone();
+    assert_eq!(summary["collisions"], 0, "{summary}");
+    assert!(summary["target_error_m"].as_f64().unwrap() < 0.05, "{summary}");
     browser.end().await;
 }

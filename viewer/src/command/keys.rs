@@ -28,7 +28,9 @@ pub(crate) fn commands(context: &Context, state: &State) -> Vec<Command> {
     if context.text_edit_focused() {
         return Vec::new();
     }
-    let is_held = context.memory(egui::Memory::focused).is_some_and(|id| !layout::is_panel(context, id));
+    let is_focused = context.memory(egui::Memory::focused).is_some_and(|id| !layout::is_panel(context, id));
+    // An open list hears of the keys that move in it.
+    let is_held = is_focused || egui::Popup::is_any_open(context);
     let is_divided = comparison::is_divider_focused(context);
     let held = comparison::held(context, state);
     context.input(|input| {

@@ -30,6 +30,15 @@ impl State {
         self.drive()?.cycles.iter().find(|cycle| cycle.step == step)
     }
 
+    /// Distances to the goal at the last decided stop and where the rover was sent there, m; `None` for a run that does not drive.
+    pub(crate) fn way_left_m(&self, (target, run): (usize, usize)) -> Option<[f64; 2]> {
+        let drive = self.drive()?;
+        let is_driver = |steering: &&Steering| (steering.target, steering.run) == (target, run);
+        let since = drive.steering.as_ref().filter(is_driver)?.command.since.unwrap_or(0);
+        let first = drive.cycles.iter().find(|cycle| cycle.step >= since)?;
+        Some([drive.cycles.last()?.goal.distance_m, first.goal.distance_m])
+    }
+
     /// How the drive stands, in a word; `None` where nobody drives.
     pub(crate) fn drive_word(&self) -> Option<&'static str> {
         let drive = self.drive()?;

@@ -40,11 +40,24 @@ impl<'a> Faces<'a> {
         let families = &self.families;
         self.outlines.entry(key).or_insert_with(|| outline(families.get(family)?, letter)).as_ref()
     }
+
+    /// The advance width of a letter one point large, points.
+    pub(crate) fn advance(&self, family: &FontFamily, letter: char) -> f32 {
+        let advance = || {
+            let font = &face_of(self.families.get(family)?, letter)?.font;
+            Some(font.h_advance_unscaled(font.glyph_id(letter)) / font.units_per_em()?)
+        };
+        advance().unwrap_or_default()
+    }
+}
+
+/// The first font that has the letter, else the first one.
+fn face_of<'a, 'f>(faces: &'a [Face<'f>], letter: char) -> Option<&'a Face<'f>> {
+    faces.iter().find(|face| face.font.glyph_id(letter).0 != 0).or(faces.first())
 }
 
 fn outline(faces: &[Face<'_>], letter: char) -> Option<Path> {
-    let has = |face: &&Face<'_>| face.font.glyph_id(letter).0 != 0;
-    let face = faces.iter().find(has).or(faces.first())?;
+    let face = face_of(faces, letter)?;
     let per_em = face.font.units_per_em()?;
     let curves = face.font.outline(face.font.glyph_id(letter))?.curves;
     let at =

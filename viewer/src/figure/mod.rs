@@ -110,8 +110,9 @@ pub(crate) struct Words {
     pub at: Pos2,
     /// By how much they are turned clockwise about their beginning, rad.
     pub angle: f32,
-    /// From the beginning to where each letter begins, points.
-    pub places: Vec<f32>,
+    /// From the beginning to where each letter begins, points; `None` for a letter that egui painted as part of a
+    /// ligature: it follows the letter before it.
+    pub places: Vec<Option<f32>>,
     /// From the beginning to the end of the last letter, points.
     pub width: f32,
     /// Size of the letters, points.

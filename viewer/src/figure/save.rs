@@ -4,9 +4,12 @@
 use egui::epaint::{ClippedShape, TextShape};
 use egui::{Context, FontDefinitions, Frame, LayerId, Margin, RawInput, Rect, Stroke, Vec2, pos2, vec2};
 
+use crate::command::Zoomable;
+use crate::drawing::view2d::View2d;
 use crate::figure::wish::{Kind, Sheet, Wish};
 use crate::figure::{Figure, Form, Ink, Piece, bitmap, shapes, svg, words};
 use crate::layout::show_pane;
+use crate::panels::bars::state_word;
 use crate::panels::pane::Pane;
 use crate::state::{State, run_letter};
 use crate::theme::{self, Looks};
@@ -17,6 +20,10 @@ const APART: Vec2 = vec2(720.0, 480.0);
 const TALL: f32 = 3000.0;
 /// Frames that are painted of it: the first ones only measure.
 const FRAMES: usize = 3;
+/// Maximum height of a figure in its widths.
+const ASPECT_MAX: f32 = 1.5;
+/// Maximum room above and below an image for marks that reach beyond it, points.
+const MARK_ROOM: f32 = 24.0;
 /// Room around the words of the line above a figure, points.
 const ROOM: f32 = 5.0;
 
@@ -90,17 +97,28 @@ pub(crate) fn of_layer(context: &Context, state: &State, place: Rect, scale: f32
     shapes::figure(&painted, place, scale, &|id| state.pixels_of(id))
 }
 
-/// A panel for a paper: white, without controls, `width` points wide, and so high that all of a list is on it.
+/// A panel for a paper: white, without controls, `width` points wide, and so high that all of a list or an image is on
+/// it.
 fn on_paper(state: &State, pane: Pane, scale: f32, width: f32, place: Option<Rect>) -> Figure {
     let looks = theme::looks();
     super::ON_PAPER.set(true);
     theme::choose(Looks::Light);
-    let tall = apart(state, pane, scale, vec2(width, TALL));
-    let figure = match end_of_list(&tall) {
-        Some(height) => Figure { size: vec2(width, height), ..tall },
+    let aspect = place.map_or(APART.y / APART.x, |place| place.height() / place.width().max(1.0));
+    let height = (width * aspect.clamp(0.3, ASPECT_MAX)).round();
+    let view = match pane {
+        Pane::Left => Some(state.view(Zoomable::Left)),
+        Pane::Right => Some(state.view(Zoomable::Right)),
+        _ => None,
+    };
+    let figure = match view {
+        Some(View2d::Fit) => of_image(state, pane, scale, vec2(width, (width * ASPECT_MAX).round())),
+        Some(View2d::At { .. }) => of_image(state, pane, scale, vec2(width, height)),
         None => {
-            let aspect = place.map_or(APART.y / APART.x, |place| place.height() / place.width().max(1.0));
-            apart(state, pane, scale, vec2(width, (width * aspect.clamp(0.3, 1.5)).round()))
+            let tall = apart(state, pane, scale, vec2(width, TALL));
+            match end_of_list(&tall) {
+                Some(end) => Figure { size: vec2(width, end), ..tall },
+                None => apart(state, pane, scale, vec2(width, height)),
+            }
         }
     };
     super::ON_PAPER.set(false);
@@ -108,14 +126,44 @@ fn on_paper(state: &State, pane: Pane, scale: f32, width: f32, place: Option<Rec
     figure
 }
 
+/// An image panel that is as high as its image: drawn once to measure the image, then without the blank bands.
+fn of_image(state: &State, pane: Pane, scale: f32, size: Vec2) -> Figure {
+    let measured = apart(state, pane, scale, size);
+    let Some((canvas, blank)) = canvas_of(&measured) else {
+        // There is no image: the panel says why.
+        let height = end_of_list(&measured).unwrap_or(size.y);
+        return Figure { size: vec2(size.x, height), ..measured };
+    };
+    let below = measured.size.y - canvas.bottom();
+    let figure = apart(state, pane, scale, size - vec2(0.0, blank.floor()));
+    let height = figure.size.y - below + f32::from(theme::MARGIN);
+    Figure { size: vec2(size.x, height.min(figure.size.y).round()), ..figure }
+}
+
+/// The area in which an image is painted, and how much of its height neither the image nor its marks use, points.
+fn canvas_of(figure: &Figure) -> Option<(Rect, f32)> {
+    let is_picture = |piece: &Piece| matches!(piece.ink, Ink::Picture { .. });
+    let first = figure.pieces.iter().position(is_picture)?;
+    let (canvas, image) = (figure.pieces[first].clip, figure.pieces[first].ink.bounds());
+    let middle = canvas.center().y;
+    let reach = |bounds: Rect| {
+        let seen = bounds.intersect(canvas);
+        (seen.bottom() - middle).max(middle - seen.top())
+    };
+    let over_image = figure.pieces[first..].iter().filter(|piece| piece.clip == canvas);
+    let bounds = over_image.map(|piece| piece.ink.bounds()).filter(|bounds| bounds.intersects(image));
+    let used = bounds.map(reach).fold(0.0, f32::max).min(reach(image) + MARK_ROOM);
+    Some((canvas, (canvas.height() - 2.0 * used).max(0.0)))
+}
+
 /// Where the contents of a tall figure end; `None` for a panel that fills any height, such as a plot or an image.
 fn end_of_list(tall: &Figure) -> Option<f32> {
     let all = Rect::from_min_size(pos2(0.0, 0.0), tall.size);
     let seen = tall.pieces.iter().map(|piece| piece.ink.bounds().intersect(piece.clip).intersect(all));
     // The ground is no contents.
-    let contents = seen.filter(|bounds| bounds.is_positive() && bounds.height() < 0.9 * TALL);
+    let contents = seen.filter(|bounds| bounds.is_positive() && bounds.height() < 0.9 * tall.size.y);
     let end = contents.map(|bounds| bounds.bottom()).fold(0.0, f32::max);
-    (end > 0.0 && end < 0.9 * TALL).then(|| (end + f32::from(theme::MARGIN)).ceil())
+    (end > 0.0 && end < 0.9 * tall.size.y).then(|| (end + f32::from(theme::MARGIN)).ceil())
 }
 
 /// A panel painted where nobody sees it.
@@ -147,8 +195,9 @@ fn named(context: &Context, state: &State, pane: Pane, mut figure: Figure) -> Fi
     figure.title = if of.is_empty() { pane.title().to_owned() } else { format!("{}: {of}", pane.title()) };
     let session =
         state.session.as_ref().map(|session| format!(" Session {}.", session.id)).unwrap_or_default();
-    let row = state.row().map(|row| format!(" The target is {}.", row.state)).unwrap_or_default();
-    figure.description = format!("The panel “{}” of Sightline.{session}{row}", pane.title());
+    let word = state.row().map(|row| state_word(state.tracking().unwrap_or_default(), row).0);
+    let tracking = word.map(|word| format!(" Tracking state: {word}.")).unwrap_or_default();
+    figure.description = format!("The panel “{}” of Sightline.{session}{tracking}", pane.title());
     if state.exports.burns_in {
         let words = figure.title.clone();
         figure = under_a_line(context, figure, words);

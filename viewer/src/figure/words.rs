@@ -6,10 +6,14 @@ use egui::{Color32, Stroke, Vec2, vec2};
 
 use crate::figure::{Form, Ink, Words};
 
+/// Widest difference between a place that egui rounded to whole pixels and the exact one, points.
+const ROUNDING: f32 = 1.0;
+
 /// Letters of one look that stand beside each other.
 struct Run<'a> {
     format: &'a TextFormat,
-    letters: Vec<(char, Glyph)>,
+    /// Each letter with the x coordinate of its beginning in the row, points.
+    letters: Vec<(Glyph, f32)>,
 }
 
 /// The words of a text with what underlines them and lies behind them.
@@ -28,8 +32,8 @@ pub(crate) fn inks(shape: &TextShape) -> Vec<Ink> {
                 .find(|section| (section.byte_range.start.0..section.byte_range.end.0).contains(&at));
             let Some(format) = section.or(sections.last()).map(|section| &section.format) else { continue };
             match runs.last_mut().filter(|run| run.continues(format, glyph)) {
-                Some(run) => run.letters.push((glyph.chr, *glyph)),
-                None => runs.push(Run { format, letters: vec![(glyph.chr, *glyph)] }),
+                Some(run) => run.letters.push((*glyph, next_x(run, glyph))),
+                None => runs.push(Run { format, letters: vec![(*glyph, glyph.pos.x)] }),
             }
         }
         if row.ends_with_newline {
@@ -40,19 +44,36 @@ pub(crate) fn inks(shape: &TextShape) -> Vec<Ink> {
     inks
 }
 
+/// Returns the exact beginning of the letter that follows a run. egui rounds it to whole pixels of the screen, which
+/// shows at a larger scale.
+fn next_x(run: &Run<'_>, glyph: &Glyph) -> f32 {
+    let Some((last, x)) = run.letters.last() else { return glyph.pos.x };
+    let spacing = if is_in_ligature(glyph) { 0.0 } else { run.format.extra_letter_spacing };
+    let exact = x + last.advance_width + spacing;
+    // Rows that are justified have further space between words.
+    if (exact - glyph.pos.x).abs() <= ROUNDING { exact } else { glyph.pos.x }
+}
+
+/// Returns whether a letter is part of the glyph before it, such as the second “f” of the ligature “ff”.
+fn is_in_ligature(glyph: &Glyph) -> bool {
+    glyph.advance_width == 0.0 && glyph.uv_rect.is_nothing()
+}
+
 impl Run<'_> {
     /// Whether a letter goes on in the same look on the same baseline.
     fn continues(&self, format: &TextFormat, glyph: &Glyph) -> bool {
         std::ptr::eq(self.format, format)
-            && self.letters.last().is_some_and(|(_, last)| last.pos.y == glyph.pos.y)
+            && self.letters.last().is_some_and(|(last, _)| last.pos.y == glyph.pos.y)
     }
 
     fn ink(&self, shape: &TextShape, row: &PlacedRow, inks: &mut Vec<Ink>) {
-        let text: String = self.letters.iter().map(|(c, _)| *c).collect();
-        let (Some((_, first)), Some((_, last))) = (self.letters.first(), self.letters.last()) else { return };
+        let text: String = self.letters.iter().map(|(glyph, _)| glyph.chr).collect();
+        let (Some((first, _)), Some((last, last_x))) = (self.letters.first(), self.letters.last()) else {
+            return;
+        };
         let turn = egui::emath::Rot2::from_angle(shape.angle);
         let place = |offset: Vec2| shape.pos + turn * (row.pos.to_vec2() + offset);
-        let width = last.max_x() - first.pos.x;
+        let width = last_x + last.advance_width - first.pos.x;
         let at = place(first.pos.to_vec2());
         let solid = |colour: Color32| {
             let known = if colour == Color32::PLACEHOLDER { shape.fallback_color } else { colour };
@@ -75,7 +96,11 @@ impl Run<'_> {
                 text,
                 at,
                 angle: shape.angle,
-                places: self.letters.iter().map(|(_, glyph)| glyph.pos.x - first.pos.x).collect(),
+                places: self
+                    .letters
+                    .iter()
+                    .map(|(glyph, x)| (!is_in_ligature(glyph)).then_some(x - first.pos.x))
+                    .collect(),
                 width,
                 size: self.format.font_id.size,
                 family: self.format.font_id.family.clone(),

@@ -66,6 +66,10 @@ pub struct Recordings {
     pub sending: Option<Sending>,
     /// The upload that the server has of this page.
     pub upload: Option<UploadView>,
+    /// What the person calls the folder or archive that was sent.
+    pub sent_name: String,
+    /// The folder of the recording that is shown, as the person knows it.
+    pub folder_name: String,
     /// Whether the import of the recording that is shown was asked for and not answered yet.
     pub is_starting: bool,
     /// The import that this page started and that has not ended.
@@ -119,9 +123,22 @@ impl State {
                 return;
             }
             recordings.examining = None;
+            // What was sent is named as the person knows it, not by its folder on the server.
+            let sent = recordings.upload.as_ref().map(|upload| upload.path.clone());
+            let name = recordings.sent_name.clone();
+            let named = |text: &str| match &sent {
+                Some(folder) => text.replace(folder.as_str(), &name),
+                None => text.to_owned(),
+            };
             match outcome {
-                Ok(view) => recordings.shown = Some(view),
-                Err(problem) => recordings.problem = Some(problem),
+                Ok(view) => {
+                    recordings.folder_name = named(&view.path);
+                    recordings.shown = Some(view);
+                }
+                Err(problem) => {
+                    let detail = named(&problem.detail);
+                    recordings.problem = Some(Problem { detail, ..problem });
+                }
             }
         });
     }
@@ -132,6 +149,7 @@ impl State {
         self.files.is_open = true;
         let recordings = &mut self.files.recordings;
         (recordings.shown, recordings.problem) = (None, None);
+        recordings.sent_name.clone_from(&chosen.name);
         recordings.sending = Some(Sending { chosen, sent: 0 });
         let call = Call::to::<BeginUpload>(&Anywhere {});
         self.call_with_problem::<BeginUpload>(call, |state, outcome| match outcome {

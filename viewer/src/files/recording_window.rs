@@ -137,7 +137,7 @@ pub(super) fn card(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(FilesAsk)) ->
     let recordings = &state.files.recordings;
     let Some(view) = &recordings.shown else { return false };
     ui.label(RichText::new(&view.name).size(15.0).strong().color(theme::strong()));
-    contents(ui, view);
+    contents(ui, view, &recordings.folder_name);
     problem(ui, state);
     ui.add_space(6.0);
     if let Some(job) = &recordings.import {
@@ -164,7 +164,7 @@ pub(super) fn card(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(FilesAsk)) ->
     true
 }
 
-fn contents(ui: &mut Ui, view: &RecordingView) {
+fn contents(ui: &mut Ui, view: &RecordingView, folder: &str) {
     let size = |[width, height]: [u32; 2]| format!("{width} × {height} px");
     let sizes = if view.left_size == view.right_size {
         size(view.left_size)
@@ -180,7 +180,7 @@ fn contents(ui: &mut Ui, view: &RecordingView) {
     let further = view.further_cameras.join(", ");
     let mut rows = vec![
         ("format", view.format.as_str()),
-        ("folder", view.path.as_str()),
+        ("folder", folder),
         ("stops", stops.as_str()),
         ("images", sizes.as_str()),
         ("stereo", stereo),

@@ -21,7 +21,7 @@ impl State {
         match ask {
             Ask::Open => {
                 self.files.is_open = true;
-                self.files.refused = None;
+                (self.files.refused, self.files.recordings.problem) = (None, None);
                 self.read_recent();
                 // A drive on commands has more stops than when the list was read.
                 self.read_traverses();

@@ -1,10 +1,10 @@
 //! The bars: title and status at the top, stages and the newest message at the bottom, and the banner.
 
 use egui::scroll_area::ScrollBarVisibility;
-use egui::{Align, Button, ComboBox, Layout, Response, RichText, ScrollArea, Ui};
+use egui::{Align, Button, Color32, ComboBox, Layout, Response, RichText, ScrollArea, Ui};
 use sightline_record::Unit;
 use sightline_session::records;
-use sightline_session::step::RunStep;
+use sightline_session::step::{RunStep, StepRow};
 use sightline_track::target::TrackingState;
 
 use crate::command::table::{
@@ -124,13 +124,7 @@ pub(crate) fn status(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     };
     let tracking = state.tracking().unwrap_or_default();
     let is_not_searched = row.not_searched;
-    let (word, colour) = match tracking {
-        _ if is_not_searched => ("NOT SEARCHED".to_owned(), theme::weak()),
-        _ if tracking == TrackingState::Tracking && row.tracked == Some(false) => {
-            ("FALSE TRACKING".to_owned(), theme::failed())
-        }
-        other => (other.word().to_uppercase(), theme::state(tracking)),
-    };
+    let (word, colour) = state_word(tracking, row);
     let shown = ui.label(RichText::new(word).strong().color(colour));
     match tracking {
         _ if is_not_searched => {
@@ -157,6 +151,17 @@ pub(crate) fn status(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         }
     }
     readouts::states(ui, state);
+}
+
+/// The tracking state of a step in capitals, checked against the ground truth where there is one, and its colour.
+pub(crate) fn state_word(tracking: TrackingState, row: &StepRow) -> (String, Color32) {
+    match tracking {
+        _ if row.not_searched => ("NOT SEARCHED".to_owned(), theme::weak()),
+        TrackingState::Tracking if row.tracked == Some(false) => {
+            ("FALSE TRACKING".to_owned(), theme::failed())
+        }
+        other => (other.word().to_uppercase(), theme::state(other)),
+    }
 }
 
 /// The banner that says the server is gone.
@@ -186,7 +191,7 @@ pub(crate) fn transport(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         ui.add_space(8.0);
         run_progress(ui, state, out);
         if let Some((k, n)) = state.rendering {
-            progress_bar(ui, &format!("rendering {k} of {n} stops"), k, n);
+            progress_bar(ui, &format!("rendering {k} of {n} stops"), k as f64 / n.max(1) as f64);
         }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| newest_message(ui, state, out));
     });
@@ -195,12 +200,19 @@ pub(crate) fn transport(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 fn run_progress(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     for ((target, run), progress) in &state.progress {
         let name = run_letter(*run);
-        progress_bar(
-            ui,
-            &format!("run {name}: {} of {}, {}", progress.k, progress.n, progress.doing),
-            progress.k,
-            progress.n,
-        );
+        let (words, part) = match state.way_left_m((*target, *run)) {
+            Some([left_m, first_m]) => {
+                let stop = progress.k.saturating_sub(1);
+                let left = numbers::fixed(left_m, 2);
+                let words = format!("run {name}: stop {stop}, {left} m to the goal");
+                (words, 1.0 - left_m / first_m.max(left_m))
+            }
+            None => {
+                let words = format!("run {name}: {} of {}, {}", progress.k, progress.n, progress.doing);
+                (words, progress.k as f64 / progress.n.max(1) as f64)
+            }
+        };
+        progress_bar(ui, &words, part);
         if ui.small_button("Cancel").clicked() {
             out.push(Command::CancelRun { target: *target, run: *run });
         }
@@ -209,11 +221,10 @@ fn run_progress(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 }
 
 /// A thin bar with its words.
-fn progress_bar(ui: &mut Ui, words: &str, k: usize, n: usize) {
-    let fraction = k as f32 / n.max(1) as f32;
+fn progress_bar(ui: &mut Ui, words: &str, part: f64) {
     let (rect, _) = ui.allocate_exact_size(egui::vec2(90.0, 6.0), egui::Sense::hover());
     ui.painter().rect_filled(rect, 3.0, theme::unknown());
-    let done = egui::Rect::from_min_size(rect.min, egui::vec2(rect.width() * fraction, rect.height()));
+    let done = egui::Rect::from_min_size(rect.min, egui::vec2(rect.width() * part as f32, rect.height()));
     ui.painter().rect_filled(done, 3.0, theme::accent());
     ui.label(theme::note(words));
 }

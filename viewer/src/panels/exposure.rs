@@ -19,7 +19,7 @@ const SATURATED_SHARE: f32 = 0.01;
 /// Shows the row.
 pub(crate) fn show(ui: &mut Ui, state: &State, raster: &Raster, entries: &[Entry], out: &mut Vec<Command>) {
     if figure::is_on_paper() {
-        return legend::above(ui, entries, state, out);
+        return legend::above_image(ui, entries, state, out);
     }
     ui.horizontal(|ui| {
         ui.set_height(HEIGHT);

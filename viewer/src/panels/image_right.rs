@@ -22,7 +22,7 @@ use crate::panels::panel::Panel;
 use crate::panels::status_line::{STATUS, status_line};
 use crate::pointed::Pointed;
 use crate::state::{State, run_letter};
-use crate::theme;
+use crate::{figure, theme};
 
 /// From how near to the curve its range is told, px.
 const NEAR_PX: f64 = 40.0;
@@ -45,7 +45,12 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     camera_choice::show(ui, state, out);
     let Some(raster) = ready_image(ui, state, Eye::Right, out) else { return };
     raster.stretch(state.stretch);
-    ui.horizontal(|ui| legend::button(ui, &entries(state), state, out));
+    let entries = theme::on_image(|| entries(state));
+    if figure::is_on_paper() {
+        legend::above_image(ui, &entries, state, out);
+    } else {
+        ui.horizontal(|ui| legend::button(ui, &entries, state, out));
+    }
     picture(ui, state, raster, out);
 }
 
@@ -66,7 +71,7 @@ fn picture(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) 
     if let Some(trace) = state.trace_on_image().filter(|_| state.marks && state.shows_target()) {
         theme::on_image(|| paint_marks(&canvas, trace, state));
     }
-    compared::paint_right(&Overlay::new(&canvas.painter, &canvas.transform), state);
+    theme::on_image(|| compared::paint_right(&Overlay::new(&canvas.painter, &canvas.transform), state));
     let pointed = paint_pointed(&canvas, state);
     let here = canvas.hovered(region);
     status_line(ui, &canvas, raster, region, pointed);

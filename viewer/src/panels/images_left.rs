@@ -52,7 +52,7 @@ pub(crate) fn show(
     camera_choice::show(ui, state, out);
     let raster = ready_image(ui, state, Eye::Left, out)?;
     raster.stretch(state.stretch);
-    exposure::show(ui, state, raster, &entries(state), out);
+    exposure::show(ui, state, raster, &theme::on_image(|| entries(state)), out);
     bar::show(ui, state, out);
     if let Some(shown) = modes::instead(ui, state, raster, out) {
         return shown;
@@ -78,7 +78,7 @@ fn picture(
     if state.marks {
         theme::on_image(|| paint_marks(&canvas, state));
     }
-    modes::over(ui, &canvas, state, out);
+    theme::on_image(|| modes::over(ui, &canvas, state, out));
     theme::on_image(|| crate::notes::marks::image(&canvas, state));
     let described = picking::show(ui, &canvas, raster, state, out);
     if state.shows_targets_camera() {

@@ -67,6 +67,23 @@ pub(crate) fn width_of(ui: &Ui, entry: &Entry) -> f32 {
     galley.size().x + MARK
 }
 
+/// The legend of an image in rows above it, on the dark ground on which its marks are painted.
+///
+/// Make the entries inside [`theme::on_image`], so that they have the colours of the marks.
+pub(crate) fn above_image(ui: &mut Ui, entries: &[Entry], state: &State, out: &mut Vec<Command>) {
+    if entries.is_empty() || !state.marks {
+        return;
+    }
+    theme::on_image(|| {
+        let frame = egui::Frame::new().fill(theme::panel()).inner_margin(3.0);
+        frame.show(ui, |ui| {
+            ui.set_width(ui.available_width());
+            let shown = entries.iter().filter(|entry| !state.hidden.contains(&entry.layer));
+            above(ui, &shown.cloned().collect::<Vec<_>>(), state, out);
+        });
+    });
+}
+
 /// The legend in rows above what follows.
 pub(crate) fn above(ui: &mut Ui, entries: &[Entry], state: &State, out: &mut Vec<Command>) {
     let widths: Vec<f32> = entries.iter().map(|entry| width_of(ui, entry)).collect();

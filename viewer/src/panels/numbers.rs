@@ -1,6 +1,8 @@
 //! Numbers: one that can be asked about, whose click leads to where it came from; and a count with its noun.
 
-use egui::{Response, RichText, Ui};
+use std::cell::RefCell;
+
+use egui::{DragValue, Response, RichText, Ui};
 
 use crate::command::Command;
 use crate::why::Ask;
@@ -10,6 +12,26 @@ pub(crate) fn show(ui: &mut Ui, text: RichText, step: usize, name: &str, out: &m
     let words = text.text().to_owned();
     let response = ui.link(text).on_hover_text(format!("Why? Where {name} comes from"));
     ask(&response, step, name, &words, out);
+}
+
+/// Adds a field for a number from `low` to `high`; while something else is typed, a note at the field says so.
+pub(crate) fn field(ui: &mut Ui, field: DragValue<'_>, low: f64, high: f64) -> Response {
+    let wrong = RefCell::new(None);
+    let read = |text: &str| {
+        let plain: String = text.chars().filter(|letter| !letter.is_whitespace()).collect();
+        let number = plain.replace('−', "-").parse::<f64>().ok();
+        let is_within = number.is_some_and(|number| (low..=high).contains(&number));
+        *wrong.borrow_mut() = (!is_within).then(|| match number {
+            Some(number) => format!("{number} is outside {low} to {high}: the nearest limit is taken"),
+            None => format!("“{}” is no number; give one from {low} to {high}", text.trim()),
+        });
+        number
+    };
+    let response = ui.add(field.range(low..=high).custom_parser(read));
+    if let Some(why) = wrong.into_inner() {
+        response.show_tooltip_text(why);
+    }
+    response
 }
 
 /// A number with its noun: `1 step`, `2 steps`.

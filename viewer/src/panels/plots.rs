@@ -112,6 +112,10 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         let is_last = i + 1 == charts.len() && derived.is_empty();
         let (title, mut lines) = names_of(chart);
         lines.extend(state.others().iter().map(|o| (o.look.mark, o.look.colour, state.run_label(o.name))));
+        if i == 0 && figure::is_on_paper() {
+            let line = Mark::Stroke(overlay::Line::Solid);
+            lines.push((line, theme::accent(), format!("step {}", state.cursor.step)));
+        }
         ui.horizontal(|ui| {
             // The button first: it stays in the panel where the names need more than that.
             if i == 0 && !figure::is_on_paper() {

@@ -6,6 +6,7 @@ use sightline_track::limits::{Domain, SettingInfo};
 use sightline_track::settings::TrackerKind;
 
 use crate::command::Command;
+use crate::panels::numbers;
 use crate::panels::panel::Panel;
 use crate::state::{State, run_letter};
 use crate::{panels, theme};
@@ -206,8 +207,8 @@ fn edit(ui: &mut Ui, info: &SettingInfo, value: &Value) -> Option<Value> {
         Domain::OddBetween(low, high) => {
             let mut number = value.as_u64().unwrap_or_default();
             let before = number;
-            ui.add(DragValue::new(&mut number).range(u64::from(*low)..=u64::from(*high)).speed(0.2))
-                .accessible_name(&info.key);
+            let field = DragValue::new(&mut number).speed(0.2);
+            numbers::field(ui, field, f64::from(*low), f64::from(*high)).accessible_name(&info.key);
             // An even number cannot be meant: the odd one in the direction of the change is.
             if number != before && number.is_multiple_of(2) {
                 number = if number > before { number + 1 } else { number - 1 };
@@ -217,16 +218,16 @@ fn edit(ui: &mut Ui, info: &SettingInfo, value: &Value) -> Option<Value> {
         Domain::Between(low, high) if info.default.is_u64() => {
             let mut number = value.as_i64().unwrap_or_default();
             let before = number;
-            ui.add(DragValue::new(&mut number).range(low.ceil() as i64..=high.floor() as i64).speed(0.05))
-                .accessible_name(&info.key);
+            let field = DragValue::new(&mut number).speed(0.05);
+            numbers::field(ui, field, low.ceil(), high.floor()).accessible_name(&info.key);
             (number != before).then(|| json!(number))
         }
         Domain::Between(low, high) => {
             let mut number = value.as_f64().unwrap_or_default();
             let before = number;
             let speed = (before.abs() * 0.01).max(0.002);
-            ui.add(DragValue::new(&mut number).range(*low..=*high).speed(speed).max_decimals(4))
-                .accessible_name(&info.key);
+            let field = DragValue::new(&mut number).speed(speed).max_decimals(4);
+            numbers::field(ui, field, *low, *high).accessible_name(&info.key);
             (number != before).then(|| json!(number))
         }
     }

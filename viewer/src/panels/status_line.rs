@@ -5,7 +5,7 @@ use sightline_vision::image::PixelRect;
 
 use crate::drawing::raster::Raster;
 use crate::drawing::view2d::Canvas;
-use crate::theme;
+use crate::{figure, theme};
 
 /// Height of the status line below an image, points.
 pub(crate) const STATUS: f32 = 22.0;
@@ -18,6 +18,10 @@ pub(crate) fn status_line(
     region: PixelRect,
     pointed: Option<String>,
 ) {
+    // A figure has no pointer, and its magnification is not that of the screen.
+    if figure::is_on_paper() {
+        return;
+    }
     ui.horizontal(|ui| {
         ui.set_height(STATUS - 4.0);
         match canvas.hovered(region) {

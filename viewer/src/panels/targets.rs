@@ -8,7 +8,7 @@ use crate::command::table::PICK;
 use crate::command::{Command, Mode};
 use crate::drawing::overlay::{Mark, paint_mark, run_mark};
 use crate::layout::command::LayoutCommand;
-use crate::panels::numbers::counted;
+use crate::panels::numbers::{counted, fixed};
 use crate::panels::pane::Pane;
 use crate::panels::panel::Panel;
 use crate::panels::{run_tree, timeline};
@@ -317,7 +317,13 @@ fn how_far(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: 
         if ui.small_button("Cancel").clicked() {
             out.push(Command::CancelRun { target: target.number, run: run.number });
         }
-        ui.label(theme::number(format!("{} of {}", progress.k, progress.n)).size(11.0));
+        let words = match state.way_left_m((target.number, run.number)) {
+            Some([left_m, _]) => {
+                format!("stop {}, {} m to the goal", progress.k.saturating_sub(1), fixed(left_m, 2))
+            }
+            None => format!("{} of {}", progress.k, progress.n),
+        };
+        ui.label(theme::number(words).size(11.0));
     } else if let Some(why) = &run.stopped {
         if ui.small_button("Resume").clicked() {
             out.push(Command::ResumeRun { target: target.number, run: run.number });

@@ -22,7 +22,7 @@ use crate::trackability::limits;
 const ROW: f32 = 18.0;
 
 /// The legend is left out where less remains for the sentence, points.
-const SENTENCE_MIN: f32 = 200.0;
+const SENTENCE_MIN: f32 = 120.0;
 
 /// Whether the line takes the place of the status line.
 pub(crate) fn is_shown(state: &State) -> bool {
@@ -71,8 +71,12 @@ fn sentence(state: &State, place: Option<Pixel>) -> (String, Color32) {
     if state.designating.is_some_and(|place| is_here(state, &place)) {
         return ("Computing the position …".to_owned(), theme::accent());
     }
+    if state.trackability.judged.is_some_and(|place| is_here(state, &place)) {
+        return ("Judging this place … Esc cancels.".to_owned(), theme::accent());
+    }
     if let Some(refusal) = refusal(state) {
-        return (closed(&refusal.sentence), theme::lost());
+        let Pixel { x, y } = refusal.place.pixel;
+        return (format!("({x:.0}, {y:.0}) {}", closed(&refusal.sentence)), theme::lost());
     }
     if state.mode != Mode::Pick {
         let hint = "Click a rock to track it. T shows where targets are easy to track.";

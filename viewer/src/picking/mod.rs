@@ -102,7 +102,8 @@ fn paint_window(canvas: &Canvas, state: &State, pixel: Pixel) {
 /// A designation that is being computed, or a place that was advised against, with the nearest good pixel.
 fn paint_designation(canvas: &Canvas, state: &State) {
     let overlay = Overlay::new(&canvas.painter, &canvas.transform);
-    if let Some(place) = state.designating.filter(|place| is_here(state, place)) {
+    let begun = state.designating.or(state.trackability.judged);
+    if let Some(place) = begun.filter(|place| is_here(state, place)) {
         overlay.mark(place.pixel, Mark::Ring, theme::accent());
     }
     if let Some(refusal) = state.refusal.as_ref().filter(|refusal| is_here(state, &refusal.place)) {

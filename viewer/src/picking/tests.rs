@@ -366,7 +366,7 @@ fn advice_is_below_the_image_and_no_control_covers_it_or_another() {
         });
         let image: egui::Rect = place.get().expect("an image");
         let control = |label: &str| shown.harness.get_by_label(label).rect();
-        let labels = ["Poor: depth edge 2 px away.", "Use (44, 28)", "Pick anyway"];
+        let labels = ["(20, 30) Poor: depth edge 2 px away.", "Use (44, 28)", "Pick anyway"];
         let controls = labels.map(control);
         for (number, control) in controls.iter().enumerate() {
             assert!(control.top() >= image.bottom(), "{control:?} covers the image {image:?}");
@@ -424,9 +424,34 @@ fn without_a_target_a_click_on_the_left_image_picks() {
     assert_eq!(click(without), 1);
     assert_eq!(click(|context| fixture::at_step(context, 0)), 0, "a target is there: T begins another pick");
     Shown::pane(Pane::Left, without).says("Click a rock to track it.");
+    // The first click is judged as any other: nothing is designated before the map says something of the place.
+    for (pixel, is_good) in [(GOOD, true), (PLACE, false)] {
+        let mut state = without(&egui::Context::default());
+        state.perform(Command::Pick(pixel));
+        assert!(state.trackability.judged.is_some() && !is_designated(&mut state), "{pixel:?}");
+        state.take_requests();
+        answer(&mut state, &progress(3));
+        assert!(!is_designated(&mut state), "its row is not made yet");
+        state.told(Event::TrackabilityProgress {
+            traverse: "drive".to_owned(),
+            step: 0,
+            k: 8,
+            n: 8,
+            ended: true,
+        });
+        state.take_requests();
+        answer(&mut state, &progress(8));
+        assert_eq!((is_designated(&mut state), state.refusal.is_none()), (is_good, is_good), "{pixel:?}");
+    }
+    // One Esc ends the pick with its advice.
     let mut state = without(&egui::Context::default());
-    state.perform(Command::Pick(GOOD));
-    assert!(is_designated(&mut state));
+    state.perform(Command::Pick(PLACE));
+    state.take_requests();
+    answer(&mut state, &progress(8));
+    assert!(state.refusal.is_some());
+    let escape = keys::command(Key::Escape, Modifiers::NONE, &state).unwrap();
+    state.perform(escape);
+    assert!(state.refusal.is_none() && state.mode == Mode::Look);
 }
 
 #[test]
@@ -441,6 +466,16 @@ fn the_note_about_a_pick_is_forgotten_with_its_session() {
     assert_eq!(note(&state).as_deref(), Some("Ridge set; tracking all stops … Use ← →."));
     let mut other = session;
     (other.id, other.targets) = ("s2".to_owned(), Vec::new());
+    state.told(Event::RunProgress {
+        session: "s1".to_owned(),
+        target: 0,
+        run: 0,
+        k: 6,
+        n: 6,
+        ended: true,
+        doing: "done".to_owned(),
+    });
+    assert_eq!(note(&state), None, "all stops are tracked");
     state.adopt(other, false);
     assert_eq!(note(&state), None, "the other session has no target");
 }

@@ -177,10 +177,9 @@ impl State {
 
     pub(crate) fn set_mode(&mut self, mode: Mode) {
         if mode == Mode::Look {
-            self.repicks = None;
+            (self.repicks, self.refusal, self.trackability.judged) = (None, None, None);
         }
         if mode == Mode::Look && self.mode == Mode::Look {
-            self.refusal = None;
             self.messages.close_card();
         }
         if mode == Mode::Pick {
@@ -193,8 +192,18 @@ impl State {
         self.mode = mode;
     }
 
-    fn pick(&mut self, pixel: Pixel) {
+    /// Picks a place: once the map judges it, it is designated or advised against. Without a target a click begins the pick.
+    pub(crate) fn pick(&mut self, pixel: Pixel) {
         let place = Place { step: self.cursor.step, pixel, camera: self.camera() };
+        if self.mode == Mode::Look {
+            self.set_mode(Mode::Pick);
+            self.sync_trackability();
+        }
+        if self.is_to_be_judged(place) {
+            (self.trackability.judged, self.refusal) = (Some(place), None);
+            return;
+        }
+        self.trackability.judged = None;
         self.refusal = self.advised_against(place);
         if self.refusal.is_none() {
             self.designate(place);

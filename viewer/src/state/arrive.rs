@@ -54,6 +54,9 @@ impl State {
             Event::RunProgress { session, target, run, k, n, ended, doing } if is_ours(&session) => {
                 if ended {
                     self.progress.remove(&(target, run));
+                    if self.progress.is_empty() {
+                        self.messages.runs_ended();
+                    }
                 } else {
                     self.progress.insert((target, run), Progress { k, n, doing });
                 }
@@ -291,12 +294,12 @@ impl State {
         if let Some(target) = self.target() {
             let step = target.designation.step;
             let label = with_capital(&target.label);
-            let text = if step + 1 < self.stop_count() {
-                format!("{label} set; tracking all stops … Use ← →.")
+            if step + 1 < self.stop_count() {
+                let text = format!("{label} set; tracking all stops … Use ← →.");
+                self.messages.note_while_running(text);
             } else {
-                format!("{label} set at the last stop of the drive.")
-            };
-            self.messages.note_of_session(text);
+                self.messages.note_of_session(format!("{label} set at the last stop of the drive."));
+            }
         }
     }
 

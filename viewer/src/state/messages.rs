@@ -32,6 +32,8 @@ pub struct Message {
     pub deed: Option<u64>,
     /// Whether it is about a target or a run of the open session.
     pub is_of_session: bool,
+    /// Whether it applies only while a run is computed.
+    pub is_of_running: bool,
     /// Whether it no longer applies: the list keeps it, the status line does not show it.
     pub is_past: bool,
 }
@@ -85,6 +87,19 @@ impl Messages {
         if let Some(last) = self.list.last_mut() {
             last.is_of_session = true;
         }
+    }
+
+    /// Something was begun that ends with the run that is being computed.
+    pub(crate) fn note_while_running(&mut self, text: impl Into<String>) {
+        self.note_of_session(text);
+        if let Some(last) = self.list.last_mut() {
+            last.is_of_running = true;
+        }
+    }
+
+    /// No run is being computed any more.
+    pub(crate) fn runs_ended(&mut self) {
+        self.list.iter_mut().filter(|message| message.is_of_running).for_each(|m| m.is_past = true);
     }
 
     /// Forgets the notes about targets and runs: another session is open.
@@ -182,9 +197,15 @@ impl Messages {
         }
     }
 
-    /// Another session was opened: notes of the earlier one no longer apply.
+    /// Another session was opened: notes about the earlier one, and what was refused there, no longer apply.
     pub(crate) fn leave_session(&mut self) {
-        self.list.iter_mut().filter(|message| message.weight == Weight::Note).for_each(|m| m.is_past = true);
+        let is_refused = |message: &Message| {
+            let details = message.about.iter().flat_map(|about| &about.details);
+            details.into_iter().any(|(name, _)| *name == "asked")
+        };
+        for message in &mut self.list {
+            message.is_past |= message.weight == Weight::Note || is_refused(message);
+        }
     }
 
     fn add(&mut self, weight: Weight, text: String, hint: Option<String>, link: Option<String>) {
@@ -205,6 +226,7 @@ impl Messages {
             about,
             deed,
             is_of_session: false,
+            is_of_running: false,
             is_past: false,
         });
         self.next += 1;
@@ -262,6 +284,10 @@ mod tests {
         messages.problem("no", None);
         messages.leave_session();
         assert!(messages.newest().is_some(), "problems stay");
+        let refusal = Problem::new(422, "setting", "", "grid: -2 is too small.");
+        messages.refused(&refusal, "post /studies/jobs".to_owned(), false);
+        messages.leave_session();
+        assert!(messages.newest().is_none(), "what was refused there is past");
     }
 
     #[test]

@@ -9,6 +9,8 @@ mod table;
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use sightline_geometry::error::Error;
+use sightline_study::plan::Plan;
 use sightline_study::row::Row;
 use sightline_study::wire::{NewStudy, StudyInfo, StudyJob};
 
@@ -60,7 +62,8 @@ impl Order {
     /// The request that starts a study.
     ///
     /// # Errors
-    /// A sentence if a seed is not a whole number.
+    /// A sentence that names the field, if a seed is not a whole number, a configuration is not known, or a value is no point of the
+    /// grid.
     pub fn request(&self, info: &StudyInfo) -> Result<NewStudy, String> {
         let words = |text: &str| -> Vec<String> {
             text.split(',').map(|word| word.trim().to_owned()).filter(|word| !word.is_empty()).collect()
@@ -71,13 +74,22 @@ impl Order {
         };
         let seeds: Vec<u64> = words(&self.seeds).iter().map(seed).collect::<Result<_, _>>()?;
         let configurations = words(&self.configurations);
+        let grid = words(&self.grid);
+        // The server's own check, with the names of this form.
+        if !(configurations.is_empty() && grid.is_empty()) {
+            Plan::new(&info.name, &configurations, &grid).map_err(|error| match error {
+                Error::Setting { key, problem } if key == "grid" => format!("{}: {problem}", info.variable),
+                Error::Setting { problem, .. } => format!("configurations: {problem}"),
+                other => other.to_string(),
+            })?;
+        }
         Ok(NewStudy {
             study: info.name.clone(),
             worlds: seeds.is_empty().then_some(WORLDS),
             seeds,
             first_seed: None,
             configurations: if configurations.is_empty() { Self::proposed(info) } else { configurations },
-            grid: words(&self.grid),
+            grid,
             scenario: None,
         })
     }

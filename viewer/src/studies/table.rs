@@ -3,6 +3,7 @@
 use egui::{Grid, RichText, ScrollArea, Ui};
 use sightline_study::row::Row;
 use sightline_study::terrain_table;
+use sightline_study::wire::StudyState;
 
 use crate::state::State;
 use crate::studies::chart;
@@ -31,7 +32,14 @@ pub(super) fn show(ui: &mut Ui, state: &State) {
         return;
     };
     if rows.is_empty() {
-        ui.label(theme::note("No run of this study is done yet. Rows appear as runs end."));
+        let is_stopped = state.studies.jobs.iter().any(|known| {
+            &known.id == job && matches!(known.state, StudyState::Cancelled | StudyState::Failed)
+        });
+        ui.label(theme::note(if is_stopped {
+            "The study was stopped before a run was done. The images that are rendered are kept: Resume goes on from there."
+        } else {
+            "No run of this study is done yet. Rows appear as runs end."
+        }));
         return;
     }
     let of_job = state.studies.jobs.iter().find(|known| &known.id == job);

@@ -80,6 +80,18 @@ fn a_study_is_started_with_what_was_typed() {
         page
     });
     wrong.says("seven is not a whole number");
+    // Configurations and grid are checked while they are typed, too, by the name of their field.
+    let typed = |configurations: &str, grid: &str| {
+        let (configurations, grid) = (configurations.to_owned(), grid.to_owned());
+        Shown::pane(Pane::Studies, move |_| {
+            let mut page = with_job(StudyState::Running);
+            page.perform(Command::OrderStudy(Order { configurations, grid, ..Order::default() }));
+            page
+        })
+    };
+    typed("ncc,foo", "").says("configurations: ");
+    typed("", "1,-2").says("n_skip: ");
+    typed("ncc", "1,2").hides("configurations: ").hides("n_skip: ");
 }
 
 #[test]

@@ -43,7 +43,7 @@ fn at_two(context: &egui::Context) -> State {
 }
 
 /// Keeps a file in the folder that `SIGHTLINE_SHOTS` names, to be looked at.
-fn keep(name: &str, bytes: &[u8]) {
+pub(super) fn keep(name: &str, bytes: &[u8]) {
     if let Some(folder) = std::env::var_os("SIGHTLINE_SHOTS") {
         let folder = std::path::PathBuf::from(folder);
         std::fs::create_dir_all(&folder).unwrap();
@@ -261,7 +261,7 @@ fn a_file_says_in_its_name_and_above_it_of_what_it_is() {
     let word =
         |name: &str| document.descendants().find(|node| node.has_tag_name(name)).unwrap().text().unwrap();
     assert_eq!(word("title"), "Map, site frame: Six stops, ridge run A, step 2 of 5");
-    assert!(word("desc").contains("Session s1. The target is tracking."), "{}", word("desc"));
+    assert!(word("desc").contains("Session s1. Tracking state: TRACKING."), "{}", word("desc"));
     assert_eq!(document.root_element().attribute("height"), Some("480"));
 
     state.perform(Command::Exports(Ask::BurnIn(true)));

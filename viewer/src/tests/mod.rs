@@ -22,6 +22,8 @@ mod sheets;
 mod sizes;
 mod shape;
 mod shape_run;
+#[path = "../figure/tests.rs"]
+mod paper;
 #[path = "../studies/tests.rs"]
 mod studies;
 mod timelines;

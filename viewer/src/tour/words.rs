@@ -20,8 +20,8 @@ impl Bubble {
             Self::WhatIf => "The page now searches (C) for the smallest change of one setting that would have kept the target, and \
                 tests each by computing the step. Run makes a branch with that change; the first run stays as it is."
                 .to_owned(),
-            Self::Compare => "Choose the other run after vs in the top bar: its marks and differences appear \
-                everywhere. D goes to where the two first differ, V to the next way of laying the images beside each \
+            Self::Compare => "Once there is a second run, choose it after vs in the top bar: its marks and \
+                differences appear everywhere. D goes to where the two first differ, V to the next way of laying the images beside each \
                 other; the arrangement Compare (Shift+5) lists the metrics of each run."
                 .to_owned(),
             Self::Share => "Y copies a link to what you see, M pins a note to it, and Export (Ctrl+S) has recordings, \

@@ -10,6 +10,7 @@ use sightline_geometry::frames::Pixel;
 use sightline_rover::trackability::MapProgress;
 use sightline_track::settings::Changes;
 
+use crate::state::Place;
 use crate::trackability::limits::Form;
 
 /// A map of trackability: the traverse, the stop, and the limits that are not the defaults.
@@ -26,6 +27,8 @@ pub struct Trackability {
     pub form: Option<Form>,
     /// How far the map is; none before the first answer.
     pub progress: Option<MapProgress>,
+    /// The place that was picked and is designated once the map judges it.
+    pub judged: Option<Place>,
     /// The place chosen by keys.
     pub aim: Option<Pixel>,
     is_asked: bool,

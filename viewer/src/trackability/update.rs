@@ -62,6 +62,16 @@ impl State {
         }
     }
 
+    /// Whether the map will say something of a place, and does not yet.
+    pub(crate) fn is_to_be_judged(&self, place: Place) -> bool {
+        let progress = self.trackability.progress.as_ref();
+        let is_coming = match progress {
+            Some(progress) => !progress.ended,
+            None => self.trackability.is_asked || self.trackability.is_stale,
+        };
+        is_coming && place.camera.is_none() && self.trackability_at(place.pixel).is_none()
+    }
+
     /// The advice against a place that the map calls risky or poor; `None` without a map.
     pub(crate) fn advised_against(&self, place: Place) -> Option<Refusal> {
         let cell = self.trackability_at(place.pixel).filter(|cell| cell.verdict != Verdict::Good)?;
@@ -94,8 +104,9 @@ impl State {
             let is_made = known.progress.as_ref().is_none_or(|progress| progress.ended);
             let unfinished = known.place.take().filter(|_| !is_made);
             let (limits, form) = (std::mem::take(&mut known.limits), known.form.take());
-            let aim = known.aim;
-            *known = Trackability { aim, limits, form, ..Trackability::default() };
+            let (aim, judged) = (known.aim, known.judged.take());
+            let judged = judged.filter(|place| place.step == self.cursor.step);
+            *known = Trackability { aim, judged, limits, form, ..Trackability::default() };
             (known.is_stale, known.place) = (wanted.is_some(), wanted);
             if let Some(place) = unfinished {
                 let call = map_call::<CancelTrackability>(&place);
@@ -135,6 +146,7 @@ impl State {
             return;
         }
         known.is_asked = false;
+        let waiting = known.judged;
         match answer {
             Ok(progress) => known.progress = Some(progress),
             // The server is unreachable: read it again when it is back.
@@ -143,6 +155,9 @@ impl State {
                 known.progress =
                     Some(MapProgress { k: 0, n: 0, ended: true, failed: Some(problem.detail), map: None });
             }
+        }
+        if let Some(place) = waiting.filter(|place| !self.is_to_be_judged(*place)) {
+            self.pick(place.pixel);
         }
     }
 }

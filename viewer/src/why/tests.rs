@@ -307,6 +307,17 @@ fn a_question_that_goes_on_shows_how_far_and_can_be_cancelled() {
 }
 
 #[test]
+fn an_explanation_of_another_target_is_not_shown() {
+    let mut state = lost();
+    state.perform(Command::Why(Ask::Value { step: LOST, value: "state".to_owned() }));
+    assert!(state.explained().is_some());
+    state.cursor.target = Some(1);
+    assert!(state.explained().is_none());
+    state.cursor.target = Some(0);
+    assert!(state.explained().is_some(), "it is there again with its target");
+}
+
+#[test]
 fn a_question_is_asked_once_followed_by_events_and_found_again_by_a_new_page() {
     let mut state = lost();
     state.want_question();

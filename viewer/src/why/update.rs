@@ -34,9 +34,10 @@ impl State {
         self.why.questions.get(&self.step_key(self.cursor.step)?)
     }
 
-    /// The value that is shown, with its tree.
+    /// The value that is shown, with its tree: the last one that was asked for of the target at the cursor.
     pub fn explained(&self) -> Option<(&StepKey, &str, &Told<Explanation>)> {
-        let (key, value) = self.why.asked.last()?;
+        let is_of_target = |(key, _): &&(StepKey, String)| Some(key.target) == self.cursor.target;
+        let (key, value) = self.why.asked.last().filter(is_of_target)?;
         let tree = self.why.trees.get(&(key.clone(), value.clone()))?;
         Some((key, value, tree))
     }

@@ -64,28 +64,31 @@ fn show_quantity(
     }
     let link = ui.link(RichText::new(quantity.label.as_ref()).size(12.0)).on_hover_text(help);
     numbers::ask(&link, step, name, &words, out);
-    let notes = |ui: &mut Ui| {
-        let formula = Some(&quantity.formula).filter(|formula| !formula.is_empty());
-        let formula = formula.map_or_else(String::new, |f| format!("= {}", theme::formula(f)));
-        for note in [quantity.unit_label(), formula].into_iter().filter(|note| !note.is_empty()) {
-            ui.label(theme::note(note));
-        }
-    };
-    match matrix_of(quantity.kind, value) {
-        Some(rows) => {
-            ui.vertical(|ui| {
+    ui.vertical(|ui| {
+        let unit = quantity.unit_label();
+        match matrix_of(quantity.kind, value) {
+            Some(rows) => {
                 matrix(ui, &rows);
-                ui.horizontal_wrapped(notes);
-            });
+                if !unit.is_empty() {
+                    ui.label(theme::note(unit));
+                }
+            }
+            None => {
+                ui.horizontal_wrapped(|ui| {
+                    ui.spacing_mut().item_spacing.x = 4.0;
+                    ui.label(theme::number(words));
+                    if !unit.is_empty() {
+                        ui.label(theme::note(unit));
+                    }
+                });
+            }
         }
-        None => {
-            ui.horizontal_wrapped(|ui| {
-                ui.spacing_mut().item_spacing.x = 4.0;
-                ui.label(theme::number(words));
-                notes(ui);
-            });
+        // On lines of its own: a text that is broken beside the value would reach into the next row of the table.
+        if !quantity.formula.is_empty() {
+            let formula = format!("= {}", theme::formula(&quantity.formula));
+            ui.add(egui::Label::new(theme::note(formula)).wrap());
         }
-    }
+    });
 }
 
 /// The value of a quantity on one line.

@@ -10,6 +10,10 @@ use crate::panels::runs::table;
 use crate::state::State;
 use crate::theme;
 
+/// Width of a remark, and what is left beside a sentence, points.
+const REMARK: f32 = 220.0;
+const MARGIN: f32 = 16.0;
+
 /// Shows the metrics.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let Some(own) = state.own_name() else { return };
@@ -19,9 +23,13 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         ui.label(theme::label(why));
         return;
     };
-    for line in header(found) {
-        ui.label(theme::note(line));
-    }
+    ui.scope(|ui| {
+        // The panel scrolls to both sides; sentences are as wide as what is seen of it.
+        ui.set_max_width((ui.clip_rect().width() - MARGIN).max(REMARK));
+        for line in header(found) {
+            ui.add(egui::Label::new(theme::note(line)).wrap());
+        }
+    });
     let names: Vec<RunName> =
         std::iter::once(own).chain(state.others().iter().map(|other| other.name)).collect();
     Grid::new("metrics").striped(true).spacing([14.0, 2.0]).show(ui, |ui| {
@@ -38,7 +46,11 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
                 table::cell(ui, state, name, metric, &state.run_label(name), out);
             }
             ui.label(theme::note(first.map_or_else(String::new, |first| first.used.to_string())));
-            ui.label(theme::note(first.and_then(|first| first.note.clone()).unwrap_or_default()));
+            ui.vertical(|ui| {
+                ui.set_max_width(REMARK);
+                let remark = first.and_then(|first| first.note.clone()).unwrap_or_default();
+                ui.add(egui::Label::new(theme::note(remark)).wrap());
+            });
             ui.end_row();
         }
     });

@@ -16,7 +16,7 @@ use crate::drawing::raster::{DIFFERENCE_LIMIT, PATCH_SIGMAS};
 use crate::panels::panel::Panel;
 use crate::panels::strip::patch::{BETWEEN, paint_patch, paint_title};
 use crate::state::State;
-use crate::theme;
+use crate::{figure, theme};
 
 /// Room for the words above and below a patch, points.
 const WORDS: (f32, f32) = (16.0, 18.0);
@@ -111,7 +111,9 @@ impl Panel for Strip {
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let patches = state.trace().map(patches).unwrap_or_default();
     let area = ui.available_rect_before_wrap();
-    let has_pointer = state.trace().is_some_and(|trace| pointed::is_there(trace));
+    // A figure has room for the pointed pixel only while there is one.
+    let has_pointer = state.trace().is_some_and(|trace| pointed::is_there(trace))
+        && (!figure::is_on_paper() || state.pointed_left().is_some());
     let template = state.trace().and_then(designated::pixel).filter(|_| !patches.is_empty());
     let first = usize::from(template.is_some());
     let frames = frames(area, first + patches.len() + usize::from(has_pointer));
