@@ -35,7 +35,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         ui.horizontal(|ui| {
             let is_closed = ui.button("Close").clicked();
             // The bar with the newest message is behind the window.
-            if let Some(message) = state.messages.newest() {
+            if let Some(message) = state.newest_message() {
                 ui.add(egui::Label::new(theme::note(&message.text)).truncate());
             }
             is_closed

@@ -230,7 +230,7 @@ fn progress_bar(ui: &mut Ui, words: &str, part: f64) {
 }
 
 fn newest_message(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
-    if let Some(message) = state.messages.newest() {
+    if let Some(message) = state.newest_message() {
         messages::undo(ui, state, message, out);
         let colour = if message.weight == Weight::Problem { theme::lost() } else { theme::weak() };
         let words = RichText::new(&message.text).small().color(colour);

@@ -286,6 +286,12 @@ impl State {
         self.run_progress().is_some() || is_incomplete
     }
 
+    /// The newest message that still applies.
+    pub(crate) fn newest_message(&self) -> Option<&messages::Message> {
+        let is_running = || self.is_running() || !self.progress.is_empty();
+        self.messages.newest().filter(|message| !message.is_of_running || is_running())
+    }
+
     /// The name of a step of the run that is looked at.
     pub fn step_key(&self, step: usize) -> Option<StepKey> {
         let (session, target) = (self.session.as_ref()?, self.target()?);
