@@ -6,6 +6,7 @@ use crate::command::{Command, Go, Mode};
 use crate::command::{actions, table};
 use crate::compare::keys as comparison;
 use crate::layout;
+use crate::panels::legend;
 use crate::picking::aim::Aim;
 use crate::state::State;
 use crate::tour::update as tour;
@@ -30,7 +31,8 @@ pub(crate) fn commands(context: &Context, state: &State) -> Vec<Command> {
     }
     let is_focused = context.memory(egui::Memory::focused).is_some_and(|id| !layout::is_panel(context, id));
     // An open list hears of the keys that move in it.
-    let is_held = is_focused || egui::Popup::is_any_open(context);
+    let is_listing = egui::Popup::is_any_open(context) && !legend::is_open(context);
+    let is_held = is_focused || is_listing;
     let is_divided = comparison::is_divider_focused(context);
     let held = comparison::held(context, state);
     context.input(|input| {

@@ -12,9 +12,9 @@ pub(crate) mod visits;
 pub(crate) mod why;
 pub(crate) mod words;
 
-use sightline_session::faults::NewFault;
 use sightline_rover::driving::DriveCommand;
 use sightline_session::driving::DriveView;
+use sightline_session::faults::NewFault;
 
 /// The drive of the open session.
 #[derive(Clone, Debug, Default)]

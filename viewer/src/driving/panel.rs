@@ -37,7 +37,6 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ScrollArea::both().auto_shrink(false).show(ui, |ui| {
         form(ui, state, out);
         visits::form(ui, state, out);
-        faults::form(ui, state, out);
         match state.drive().filter(|_| state.is_on_commands()) {
             Some(drive) => {
                 pause_form(ui, state, out);
@@ -45,6 +44,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
                 standing(ui, drive);
                 visits::list(ui, state, drive);
                 faults::list(ui, &drive.faults);
+                faults::form(ui, state, out);
                 if let Some(why) = &drive.why {
                     why::headline(ui, why, out);
                 }
@@ -53,7 +53,10 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             None if state.is_on_commands() => {
                 ui.label(theme::note("Reading the drive …"));
             }
-            None => begin(ui, state, out),
+            None => {
+                begin(ui, state, out);
+                faults::form(ui, state, out);
+            }
         }
     });
 }

@@ -51,6 +51,8 @@ pub(crate) fn button(ui: &mut Ui, entries: &[Entry], state: &State, out: &mut Ve
     let ground = theme::on_image(theme::panel);
     let popup = egui::Popup::menu(&button).close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside);
     popup.frame(egui::Frame::popup(ui.style()).fill(ground)).show(|ui| {
+        let pass = ui.ctx().cumulative_pass_nr();
+        ui.ctx().data_mut(|data| data.insert_temp(shown_id(), pass));
         theme::on_image(|| {
             for entry in entries {
                 let width = width_of(ui, entry);
@@ -59,6 +61,16 @@ pub(crate) fn button(ui: &mut Ui, entries: &[Entry], state: &State, out: &mut Ve
             }
         });
     });
+}
+
+fn shown_id() -> egui::Id {
+    egui::Id::unique("pass in which a legend was shown")
+}
+
+/// Whether a legend is open: unlike a list or a menu it leaves the keys to the page.
+pub(crate) fn is_open(context: &egui::Context) -> bool {
+    let shown = context.data(|data| data.get_temp::<u64>(shown_id()));
+    shown.is_some_and(|pass| pass + 1 >= context.cumulative_pass_nr())
 }
 
 /// What an entry takes beside others, points.
