@@ -10,6 +10,7 @@
 //! ```
 
 mod begun;
+mod sight;
 pub mod pipeline;
 pub mod pair;
 pub mod designate;

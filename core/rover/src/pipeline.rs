@@ -12,7 +12,7 @@ use std::borrow::Cow;
 use sightline_geometry::camera::{Camera, CameraName, Mast, MastAngles};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
-use sightline_geometry::frames::{Pixel, Point3, Pose};
+use sightline_geometry::frames::{Pixel, Pose};
 use sightline_geometry::odometry_error::OdometryError;
 use sightline_geometry::stereo_geometry::StereoGeometry;
 use sightline_track::cycle_stage::CycleStage;
@@ -21,7 +21,6 @@ use sightline_track::locate::{self, DesignateInput, LocateInput, Located, Place,
 use sightline_track::settings::Settings;
 use sightline_track::stages::capture::{self, Capture, StereoPair};
 use sightline_track::stages::judge;
-use sightline_track::stages::point_mast::{self, Pointing};
 use sightline_track::stages::predict;
 use sightline_track::stages::update::{self, Updated};
 use sightline_track::target::{Designation, Target, TrackingState};
@@ -29,10 +28,8 @@ use sightline_track::trace::{StepKind, StepTrace};
 
 use crate::begun::Begun;
 use crate::pair::{self, FurtherCamera, FurtherImages, StopPair};
+use crate::sight::{is_out_of_view, pointing};
 use crate::visual_odometry::{MeasuredMotion, pose_change_error};
-
-/// A target nearer to the border of an image than this part of its width is out of view: its search window would reach beyond.
-const VIEW_MARGIN: f64 = 1.0 / 16.0;
 
 /// The stops of a drive, as the stages see them.
 pub trait Stops {
@@ -246,8 +243,7 @@ fn computed_step(
     if stops.is_odometry_alone(step) {
         return begun.odometry_alone();
     }
-    let looks_elsewhere = stops.mast_target(step).is_some_and(|other| other != target.designation);
-    if looks_elsewhere && pair.as_ref().is_ok_and(|pair| !is_in_view(pair, &prediction.position_in_rover)) {
+    if is_out_of_view(stops, pair.as_ref().ok(), target, &prediction) {
         return begun.out_of_view();
     }
     let images = |pair| pair::capture(stops, step, camera, cancel).map(|images| (pair, images));
@@ -284,18 +280,6 @@ fn computed_step(
     changes.end(CycleStage::Update);
     let kind = StepKind::Tracked { predict: prediction, capture, locate, judge };
     StepTrace { step, time_s, point_mast: pointing, kind, update }
-}
-
-/// Whether both cameras of a pair show a point of the rover frame, and some ground around it.
-fn is_in_view(pair: &StopPair<'_>, point_in_rover: &Point3) -> bool {
-    [pair.left, pair.right].into_iter().all(|camera| {
-        let [width, height] = camera.size.map(f64::from);
-        let margin_px = VIEW_MARGIN * width;
-        camera.project(point_in_rover).is_some_and(|pixel| {
-            (margin_px..width - margin_px).contains(&pixel.x)
-                && (margin_px..height - margin_px).contains(&pixel.y)
-        })
-    })
 }
 
 /// Where the target should be at the next stop, perhaps displaced to a pixel of the left camera of its pair.
@@ -381,19 +365,6 @@ fn check_pixel(designation: Designation, left: &Camera) -> Result<Pixel> {
         left.width(),
         left.height()
     )))
-}
-
-/// Cameras and wanted pointing for a target that was carried to a stop, which may lack the target's pair.
-fn pointing(stops: &dyn Stops, pair: Option<&StopPair<'_>>, carried: &Target) -> Pointing {
-    let Some(pair) = pair else {
-        let (left, right) = stops.cameras(carried.step);
-        return point_mast::without_pair(left, right);
-    };
-    point_mast::point_mast(
-        &carried.position_in_rover,
-        &carried.covariance_in_rover,
-        pair.pointing(stops, carried.designation.camera),
-    )
 }
 
 /// A stop among those of its drive.

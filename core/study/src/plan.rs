@@ -20,7 +20,7 @@ use sightline_world::Scenario;
 const SOURCES: &str = env!("SIGHTLINE_STUDY_SOURCES");
 
 /// Key of the code that decides a result.
-pub fn code_key() -> String {
+pub(crate) fn code_key() -> String {
     SOURCES[..16].to_owned()
 }
 

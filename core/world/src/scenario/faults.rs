@@ -71,7 +71,7 @@ pub struct Fault {
 
 impl Fault {
     /// Whether it is there at a stop.
-    pub fn covers(&self, stop: u32) -> bool {
+    pub(crate) fn covers(&self, stop: u32) -> bool {
         (self.from_stop..=self.to_stop).contains(&stop)
     }
 

@@ -1,0 +1,49 @@
+//! How the pair of a stop sees a target that was carried there: its cameras and wanted pointing, and whether it is in view.
+
+use sightline_geometry::frames::Point3;
+use sightline_track::stages::point_mast::{self, Pointing};
+use sightline_track::stages::prediction::Prediction;
+use sightline_track::target::Target;
+
+use crate::pair::StopPair;
+use crate::pipeline::Stops;
+
+/// A target nearer to the border of an image than this part of its width is out of view: its search window would reach beyond.
+const VIEW_MARGIN: f64 = 1.0 / 16.0;
+
+/// Cameras and wanted pointing for a target that was carried to a stop, which may lack the target's pair.
+pub(crate) fn pointing(stops: &dyn Stops, pair: Option<&StopPair<'_>>, carried: &Target) -> Pointing {
+    let Some(pair) = pair else {
+        let (left, right) = stops.cameras(carried.step);
+        return point_mast::without_pair(left, right);
+    };
+    point_mast::point_mast(
+        &carried.position_in_rover,
+        &carried.covariance_in_rover,
+        pair.pointing(stops, carried.designation.camera),
+    )
+}
+
+/// Whether the mast is pointed at another target, and its pair does not show where this one is predicted.
+pub(crate) fn is_out_of_view(
+    stops: &dyn Stops,
+    pair: Option<&StopPair<'_>>,
+    target: &Target,
+    prediction: &Prediction,
+) -> bool {
+    let step = target.step + 1;
+    let looks_elsewhere = stops.mast_target(step).is_some_and(|other| other != target.designation);
+    looks_elsewhere && pair.is_some_and(|pair| !is_in_view(pair, &prediction.position_in_rover))
+}
+
+/// Whether both cameras of a pair show a point of the rover frame, and some ground around it.
+fn is_in_view(pair: &StopPair<'_>, point_in_rover: &Point3) -> bool {
+    [pair.left, pair.right].into_iter().all(|camera| {
+        let [width, height] = camera.size.map(f64::from);
+        let margin_px = VIEW_MARGIN * width;
+        camera.project(point_in_rover).is_some_and(|pixel| {
+            (margin_px..width - margin_px).contains(&pixel.x)
+                && (margin_px..height - margin_px).contains(&pixel.y)
+        })
+    })
+}
