@@ -28,7 +28,7 @@ use sightline_track::trace::{StepKind, StepTrace};
 
 use crate::begun::Begun;
 use crate::pair::{self, FurtherCamera, FurtherImages, StopPair};
-use crate::sight::{is_out_of_view, pointing};
+use crate::sight::{not_searched, pointing};
 use crate::visual_odometry::{MeasuredMotion, pose_change_error};
 
 /// The stops of a drive, as the stages see them.
@@ -240,11 +240,8 @@ fn computed_step(
     if changes.end(CycleStage::PointMast) {
         return begun.trace(changes.before > Some(CycleStage::PointMast), None, None, None);
     }
-    if stops.is_odometry_alone(step) {
-        return begun.odometry_alone();
-    }
-    if is_out_of_view(stops, pair.as_ref().ok(), target, &prediction) {
-        return begun.out_of_view();
+    if let Some(trace) = not_searched(stops, pair.as_ref().ok(), target, &begun) {
+        return trace;
     }
     let images = |pair| pair::capture(stops, step, camera, cancel).map(|images| (pair, images));
     let (pair, images) = match pair.and_then(|pair| images(pair).map_err(|error| error.to_string())) {

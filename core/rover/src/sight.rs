@@ -2,9 +2,10 @@
 
 use sightline_geometry::frames::Point3;
 use sightline_track::stages::point_mast::{self, Pointing};
-use sightline_track::stages::prediction::Prediction;
 use sightline_track::target::Target;
+use sightline_track::trace::StepTrace;
 
+use crate::begun::Begun;
 use crate::pair::StopPair;
 use crate::pipeline::Stops;
 
@@ -24,16 +25,20 @@ pub(crate) fn pointing(stops: &dyn Stops, pair: Option<&StopPair<'_>>, carried: 
     )
 }
 
-/// Whether the mast is pointed at another target, and its pair does not show where this one is predicted.
-pub(crate) fn is_out_of_view(
+/// The step of a stop at which the target is not searched: visual odometry runs alone, or the mast is pointed at another target
+/// and its pair does not show where this one is predicted.
+pub(crate) fn not_searched(
     stops: &dyn Stops,
     pair: Option<&StopPair<'_>>,
     target: &Target,
-    prediction: &Prediction,
-) -> bool {
-    let step = target.step + 1;
-    let looks_elsewhere = stops.mast_target(step).is_some_and(|other| other != target.designation);
-    looks_elsewhere && pair.is_some_and(|pair| !is_in_view(pair, &prediction.position_in_rover))
+    begun: &Begun<'_>,
+) -> Option<StepTrace> {
+    if stops.is_odometry_alone(begun.step) {
+        return Some(begun.odometry_alone());
+    }
+    let looks_elsewhere = stops.mast_target(begun.step).is_some_and(|other| other != target.designation);
+    let is_seen = |pair: &StopPair<'_>| is_in_view(pair, &begun.predict.position_in_rover);
+    (looks_elsewhere && pair.is_some_and(|pair| !is_seen(pair))).then(|| begun.out_of_view())
 }
 
 /// Whether both cameras of a pair show a point of the rover frame, and some ground around it.
