@@ -112,7 +112,7 @@ impl DrivenTraverse {
                 "the rover has come to stop {} already; choose stop {count} or a later one",
                 count - 1
             );
-            return Err(Error::setting(&format!("faults[{index}].from_stop"), problem));
+            return Err(Error::setting(format!("faults[{index}].from_stop"), problem));
         }
         let mut scenario = self.scenario.clone();
         scenario.events.faults.extend_from_slice(faults);

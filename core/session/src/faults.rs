@@ -38,7 +38,7 @@ pub fn placed(
         let NewFault { kind, from_stop, to_stop, target } = *fault;
         let number = target.unwrap_or(driver);
         let missing =
-            || Error::setting(&format!("faults[{index}].target"), format!("there is no target {number}"));
+            || Error::setting(format!("faults[{index}].target"), format!("there is no target {number}"));
         let target = designation(number).ok_or_else(missing)?;
         let truth = TargetTruth::new(source, target, None).filter(|_| kind.is_of_target());
         let target_m = truth.map(|truth| truth.position_in_site().into());

@@ -99,7 +99,7 @@ impl Session {
     /// [`Error::Setting`] that names the entry.
     pub(crate) fn check_then(&self, target: usize, then: &[usize]) -> Result<()> {
         for (index, next) in then.iter().enumerate() {
-            let refuse = |problem: String| Err(Error::setting(&format!("then[{index}]"), problem));
+            let refuse = |problem: String| Err(Error::setting(format!("then[{index}]"), problem));
             if self.target(*next).is_err() {
                 return refuse(format!("there is no target {next}"));
             }

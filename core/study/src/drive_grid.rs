@@ -311,7 +311,7 @@ mod tests {
         let folder = std::env::temp_dir();
         let flag = std::sync::atomic::AtomicBool::new(true);
         let run = |known: &[DriveRow]| grid.run(known, &folder, Cancel::from(&flag), &|_| Ok(()));
-        assert_eq!(run(std::slice::from_ref(&known)).unwrap(), [known.clone()]);
+        assert_eq!(run(std::slice::from_ref(&known)).unwrap(), std::slice::from_ref(&known));
         let other = DriveRow { code: "other".to_owned(), ..known };
         assert!(matches!(run(&[other]), Err(Error::Cancelled)), "another code is driven anew");
     }

@@ -227,7 +227,7 @@ impl Drive {
             world
         } else {
             let faulty = temporary.path().join("faulty");
-            let folder = self.out.as_ref().map_or(faulty, |out| out.clone());
+            let folder = self.out.as_ref().map_or(faulty, Clone::clone);
             let designation = |number: usize| targets.get(number).copied();
             let faults = faults::placed(world.traverse(), &self.fault, designation, 0)?;
             world.branch(1, &faults, &folder, Cancel::default())?
