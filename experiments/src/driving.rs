@@ -22,13 +22,12 @@ use sightline_rover::hazards::HazardSettings;
 use sightline_rover::navigation::NavigatorSettings;
 use sightline_session::driving::DriveSummary;
 use sightline_session::targeted_drive::TargetedDrive;
+use sightline_study::true_ground::way_to_goal_m;
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
 use sightline_world::scenario::{ClearPath, OdometryModel};
 use sightline_world::target_truth::{TargetTruth, TruthSource};
 use sightline_world::{Scenario, World, choose_targets};
-
-use crate::true_ground::true_way_m;
 
 /// One drive.
 #[derive(Clone, Debug, Serialize)]
@@ -120,7 +119,7 @@ impl Drives<'_> {
         } else {
             self.without_obstacles(&world, scenario, designation, folder)?
         };
-        let way_m = if self.obstacles { self.way_m(&world, designation)? } else { None };
+        let way_m = self.obstacles.then(|| self.way_m(&world, designation)).flatten();
         let command = self.command.clone();
         let mut drive = TargetedDrive::begin(world, designation, command, self.settings, Cancel::default())?;
         while drive.advance(self.settings, Cancel::default())? {}
@@ -128,12 +127,9 @@ impl Drives<'_> {
     }
 
     /// Length of a way over the true ground to the goal, m.
-    fn way_m(&self, begun: &DrivenTraverse, designation: Designation) -> Result<Option<f64>> {
-        let target = target_in_site(begun, designation)?;
-        let start = TruthSource::true_site_from_rover(begun.traverse(), 0).unwrap_or_default();
-        let goal_m = goal_position_m(self.command, &target, [start.translation.x, start.translation.y]);
+    fn way_m(&self, begun: &DrivenTraverse, designation: Designation) -> Option<f64> {
         let settings = (&HazardSettings::default(), &NavigatorSettings::default());
-        Ok(begun.traverse().world().and_then(|world| true_way_m(world, &start, goal_m, settings)))
+        way_to_goal_m(begun, self.command, designation, settings)
     }
 
     /// The same world without high rocks on the way to the goal.

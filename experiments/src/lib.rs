@@ -12,7 +12,6 @@
 //! | [`driving`] | closed-loop drives on slopes with slip |
 //! | `navigation` | the navigator among rocks without images, beside a planner that knows the ground |
 //! | [`spirit137`] | visual odometry along the path that Spirit drove at site 137 |
-//! | `true_ground` | the true ground as a navigator would know it, and whether a way leads over it |
 //! | [`trackability`] | targets drawn where the map says good, risky or bad, tracked against the truth |
 
 #[cfg(feature = "command-line")]
@@ -34,6 +33,5 @@ mod navigation;
 pub mod registration;
 pub mod spirit137;
 pub mod trackability;
-mod true_ground;
 #[cfg(feature = "command-line")]
 pub mod cli;

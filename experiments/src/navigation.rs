@@ -17,12 +17,12 @@ use sightline_rover::driving::set_goal::goal_position_m;
 use sightline_rover::driving::{DriveCommand, Motion, Navigator, PathInput};
 use sightline_rover::hazards::{HazardSettings, MapRules, Scan, assess, map_hazards};
 use sightline_rover::navigation::{HazardNavigator, NavigatorSettings};
+use sightline_study::true_ground::true_way_m;
 use sightline_track::target::Designation;
 use sightline_world::rover::driven::DrivenStop;
 use sightline_world::{Scenario, World, choose_targets};
 
 use crate::driving::{scenario_of, target_in_site};
-use crate::true_ground::true_way_m;
 
 /// Rays of a hazcam: every so many pixels along rows and columns.
 const RAY_STEP_PX: u32 = 2;

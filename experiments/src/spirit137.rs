@@ -142,6 +142,7 @@ fn stop(number: usize, poses: [&Pose; 2], mast_angles: Option<MastAngles>, wheel
         odometry: None,
         odometry_alone: false,
         mast_target: None,
+        handed_to: None,
         measured_tilt_deg: None,
         awaits: None,
     }

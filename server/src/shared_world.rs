@@ -3,7 +3,7 @@
 
 use std::sync::{Arc, Mutex};
 
-use sightline_geometry::camera::MastAngles;
+use sightline_geometry::camera::{CameraName, MastAngles};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
 use sightline_geometry::frames::Pixel;
@@ -60,6 +60,10 @@ impl ActiveWorld for SharedWorld<'_> {
 
     fn stay(&mut self) -> Result<()> {
         self.change(DrivenTraverse::stay)
+    }
+
+    fn hand_over(&mut self, to: CameraName) -> Result<()> {
+        self.change(|world| world.hand_over(to))
     }
 
     fn correct(&mut self, measured: MeasuredMotion) -> Result<()> {

@@ -314,10 +314,7 @@ impl ActiveWorld for DrivenTraverse {
     }
 
     fn drive(&mut self, motion: &Motion, cancel: Cancel<'_>) -> Result<DriveReport> {
-        let [length_m, turn_rad] = match *motion {
-            Motion::Arc { length_m, curvature_per_m } => [length_m, length_m * curvature_per_m],
-            Motion::Turn { angle_rad } => [0.0, angle_rad],
-        };
+        let (length_m, turn_rad) = motion.length_and_turn();
         let number = self.driven.len();
         let simulated = self.traverse.simulated.as_ref().ok_or_else(no_simulation)?;
         let world = simulated.world_until(cancel)?;
@@ -336,6 +333,12 @@ impl ActiveWorld for DrivenTraverse {
     fn stay(&mut self) -> Result<()> {
         let last = &self.driven[self.driven.len() - 1];
         self.driven.push(last.stay());
+        self.put_last()
+    }
+
+    fn hand_over(&mut self, to: CameraName) -> Result<()> {
+        let last = &self.driven[self.driven.len() - 1];
+        self.driven.push(DrivenStop { handed_to: Some(to), ..last.stay() });
         self.put_last()
     }
 
@@ -363,7 +366,8 @@ impl ActiveWorld for DrivenTraverse {
 
     fn point_mast(&mut self, angles: Option<MastAngles>) -> Result<()> {
         let number = self.driven.len() - 1;
-        if angles.is_some() && self.driven[number].mast_angles.is_some() {
+        let last = &self.driven[number];
+        if angles.is_some() && last.mast_angles.is_some() && last.handed_to.is_none() {
             self.forget_images(number, |is_own| !is_own)?;
             self.driven[number].mast_angles = angles;
             self.put_last()?;

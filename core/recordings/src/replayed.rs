@@ -8,7 +8,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use sightline_geometry::camera::MastAngles;
+use sightline_geometry::camera::{CameraName, MastAngles};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::{Pixel, Vector3};
@@ -100,6 +100,10 @@ impl ActiveWorld for Replayed<'_> {
     }
 
     fn stay(&mut self) -> Result<()> {
+        self.go_on(None).map(drop)
+    }
+
+    fn hand_over(&mut self, _to: CameraName) -> Result<()> {
         self.go_on(None).map(drop)
     }
 

@@ -261,6 +261,7 @@ fn computed_step(
         shared: pair.shared,
         place: place(stops, step, camera, settings),
         lost_count: lost_count(last.state),
+        was_found: last.state == TrackingState::Tracking,
         settings,
         cancel,
     };
@@ -372,11 +373,18 @@ fn place(stops: &dyn Stops, step: usize, camera: Option<CameraName>, settings: &
     let changes =
         |from: usize, to: usize| left(from).zip(left(to)).is_some_and(|(a, b)| !is_same_pair(a, b, share));
     let is_last = step + 1 >= stops.stop_count();
+    // Where the mast was pointed at a target, the rover was driven: which stop will be the last is not known there.
+    let is_driven = stops.mast_target(step).is_some();
     Place {
         step,
         is_hand_over: step > 0 && changes(step - 1, step),
-        is_last_of_pair: is_last || changes(step, step + 1),
+        is_last_of_pair: if is_driven { has_stayed(stops, step) } else { is_last || changes(step, step + 1) },
     }
+}
+
+/// Whether the rover stands where it stood at the stop before.
+pub(crate) fn has_stayed(stops: &dyn Stops, step: usize) -> bool {
+    step > 0 && stops.site_from_rover(step) == stops.site_from_rover(step - 1)
 }
 
 /// Whether two left cameras are the same one, however it points: equal image size and kind of model, focal lengths that

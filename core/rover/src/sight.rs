@@ -37,7 +37,9 @@ pub(crate) fn not_searched(
         return Some(begun.odometry_alone());
     }
     let looks_elsewhere = stops.mast_target(begun.step).is_some_and(|other| other != target.designation);
-    let is_seen = |pair: &StopPair<'_>| is_in_view(pair, &begun.predict.position_in_rover);
+    // A pair on the body took over for that other target.
+    let is_of_mast = stops.mast_angles(begun.step).is_some() || stops.mast().is_none();
+    let is_seen = |pair: &StopPair<'_>| is_of_mast && is_in_view(pair, &begun.predict.position_in_rover);
     (looks_elsewhere && pair.is_some_and(|pair| !is_seen(pair))).then(|| begun.out_of_view())
 }
 

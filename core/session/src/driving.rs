@@ -17,9 +17,9 @@ use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Vector3;
 use sightline_recordings::{DrivenTraverse, Followed, Traverse};
 use sightline_rover::driving::executive::{self, CycleInput};
-use sightline_rover::driving::map_hazards::hazard_camera;
+use sightline_rover::driving::map_hazards::{body_pair, hazard_camera};
 use sightline_rover::driving::set_goal::goal_position_m;
-use sightline_rover::driving::{Cycle, DriveCommand, HazardMaps, StopReason};
+use sightline_rover::driving::{ArrivalAction, Cycle, DriveCommand, HazardMaps, StopReason};
 use sightline_track::trace::StepTrace;
 use sightline_world::World;
 use sightline_world::scenario::Fault;
@@ -126,6 +126,9 @@ pub(crate) fn check_command(traverse: &Traverse, command: &DriveCommand, first: 
     let target = &first.update.target;
     command.validate_for(&target.position_in_rover)?;
     hazard_camera(traverse, first.step, command)?;
+    if command.on_arrival.contains(&ArrivalAction::HandOff) {
+        body_pair(traverse, first.step, command)?;
+    }
     let since = command.since.unwrap_or(first.step);
     if !(first.step..traverse.stop_count()).contains(&since) {
         let problem = format!("{since} is no stop between the designation, {}, and the last one", first.step);
@@ -207,7 +210,7 @@ pub fn cycle_before(
 /// A decision as it counts for the next one: actions after arrival at another goal are left out.
 fn towards_goal(world: &DrivenTraverse, command: &DriveCommand, mut cycle: Cycle) -> Cycle {
     if world.followed(cycle.step).is_some_and(|followed| !command.has_goal_of(&followed.command)) {
-        cycle.arrival_actions = 0;
+        (cycle.arrival_actions, cycle.motions_begun) = (0, 0);
     }
     cycle
 }

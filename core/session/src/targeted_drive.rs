@@ -169,6 +169,23 @@ impl TargetedDrive {
         true
     }
 
+    /// Gives the rover another command where it stands, once the drive under the present one has ended; [`Self::advance`] goes on.
+    ///
+    /// # Errors
+    /// A command that makes no sense for the target, and a drive that has not ended or cannot go on; nothing has changed then.
+    pub fn go_on(&mut self, command: DriveCommand) -> Result<()> {
+        let ending = self.ending().filter(|ending| ending.reason.is_of_target());
+        let (Some(_), Some(first), Some(last)) = (ending, self.steps.first(), self.steps.last()) else {
+            return Err(Error::Request("the drive cannot go on under another command".to_owned()));
+        };
+        let command = DriveCommand { since: Some(last.step), ..command };
+        check_command(self.world.traverse(), &command, &first.trace)?;
+        self.command = command;
+        // The decision of this stop is made anew.
+        self.cycles.pop();
+        Ok(())
+    }
+
     /// The outcome so far, for the present target.
     pub fn summary(&self) -> DriveSummary {
         summary(&self.world, &self.command, &self.steps, &self.cycles)

@@ -4,6 +4,9 @@
 //! placed one, with the slip of firm soil; the seed draws the direction of the slope as well. The columns are those of the summary of
 //! `sightline drive`.
 //!
+//! Whether a way leads to the goal is found on the true ground by the limits of the navigator, of `gestalt` for `arcs`
+//! (`true_ground.rs`).
+//!
 //! The interval of the share of arrived drives is that of Clopper and Pearson, 95 %. Source: driving.md §2, R98.
 
 use std::collections::BTreeMap;
@@ -19,6 +22,8 @@ use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_recordings::DrivenTraverse;
 use sightline_rover::driving::{DriveCommand, NavigatorKind};
+use sightline_rover::hazards::HazardSettings;
+use sightline_rover::navigation::NavigatorPreset;
 use sightline_rover::visual_odometry::OdometryMode;
 use sightline_session::driving::DriveSummary;
 use sightline_session::targeted_drive::TargetedDrive;
@@ -27,6 +32,7 @@ use sightline_track::target::Designation;
 use sightline_world::{Scenario, choose_targets, library};
 
 use super::plan::code_key;
+use super::true_ground::way_to_goal_m;
 
 /// A place of the grid.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -57,6 +63,8 @@ pub struct DriveRow {
     pub samples_per_axis: u32,
     /// Why it could not begin; null where it did.
     pub problem: Option<String>,
+    /// Length of a way over the true ground to the goal, m; null without one.
+    pub way_m: Option<f64>,
     /// The outcome; absent where it could not begin.
     #[serde(flatten)]
     pub summary: Option<DriveSummary>,
@@ -74,6 +82,8 @@ pub struct CellSummary {
     pub arrived: usize,
     /// See `arrived`.
     pub arrived_interval: [f64; 2],
+    /// Drives for which there was a way, and those of them that arrived.
+    pub with_way: [usize; 2],
     /// Collisions in all drives.
     pub collisions: u32,
     /// How the others ended, by reason.
@@ -139,6 +149,7 @@ impl DriveGrid {
                 size: self.size,
                 samples_per_axis: self.samples_per_axis,
                 problem: None,
+                way_m: None,
                 summary: None,
             };
             if let Some(found) = known.iter().find(|row| row.is_of(&empty)) {
@@ -150,7 +161,7 @@ impl DriveGrid {
             // The images of a hundred drives would fill a disk.
             let _ = std::fs::remove_dir_all(&place);
             let row = match driven {
-                Ok(summary) => DriveRow { summary: Some(summary), ..empty },
+                Ok((way_m, summary)) => DriveRow { way_m, summary: Some(summary), ..empty },
                 Err(Error::Cancelled) => return Err(Error::Cancelled),
                 Err(error) => DriveRow { problem: Some(error.to_string()), ..empty },
             };
@@ -160,7 +171,14 @@ impl DriveGrid {
         all.par_iter().map(one).collect()
     }
 
-    fn drive(&self, cell: &Cell, seed: u64, folder: &Path, cancel: Cancel<'_>) -> Result<DriveSummary> {
+    /// The length of a way over the true ground, and the outcome.
+    fn drive(
+        &self,
+        cell: &Cell,
+        seed: u64,
+        folder: &Path,
+        cancel: Cancel<'_>,
+    ) -> Result<(Option<f64>, DriveSummary)> {
         let scenario = self.scenario(cell, seed)?;
         let world = DrivenTraverse::begin(&scenario, folder, cancel)?;
         let traverse = world.traverse();
@@ -170,16 +188,22 @@ impl DriveGrid {
         let command =
             DriveCommand { navigator: cell.navigator, odometry: cell.odometry, ..DriveCommand::default() };
         let (designation, settings) = (Designation::new(0, pixel), Settings::default());
+        let limits = match cell.navigator {
+            NavigatorKind::Morphin => NavigatorPreset::Morphin.settings(),
+            NavigatorKind::Gestalt | NavigatorKind::Arcs => NavigatorPreset::Gestalt.settings(),
+        };
+        let way_m = way_to_goal_m(&world, &command, designation, (&HazardSettings::default(), &limits));
         let mut drive = TargetedDrive::begin(world, designation, command, &settings, cancel)?;
         while drive.advance(&settings, cancel)? {}
-        Ok(drive.summary())
+        Ok((way_m, drive.summary()))
     }
 
     /// The outcome of every cell.
     pub fn summaries(&self, rows: &[DriveRow]) -> Vec<CellSummary> {
         let of_cell = |cell: &Cell| {
-            let made: Vec<DriveSummary> =
-                rows.iter().filter(|row| row.cell == *cell).filter_map(|row| row.summary).collect();
+            let own = |row: &&DriveRow| row.cell == *cell;
+            let made: Vec<(bool, DriveSummary)> =
+                rows.iter().filter(own).filter_map(|row| Some((row.way_m.is_some(), row.summary?))).collect();
             summary(*cell, &made)
         };
         self.cells.iter().map(of_cell).collect()
@@ -194,7 +218,10 @@ impl DriveRow {
     }
 }
 
-fn summary(cell: Cell, made: &[DriveSummary]) -> CellSummary {
+/// The outcome of a cell; of each drive, whether there was a way.
+fn summary(cell: Cell, drives: &[(bool, DriveSummary)]) -> CellSummary {
+    let made: Vec<DriveSummary> = drives.iter().map(|(_, summary)| *summary).collect();
+    let with_way = || drives.iter().filter(|(has_way, _)| *has_way);
     let arrived = || made.iter().filter(|summary| summary.arrived);
     let mut reasons = BTreeMap::new();
     for reason in made.iter().filter(|summary| !summary.arrived).filter_map(|summary| summary.reason) {
@@ -210,6 +237,7 @@ fn summary(cell: Cell, made: &[DriveSummary]) -> CellSummary {
         drives: made.len(),
         arrived: arrived().count(),
         arrived_interval: interval(arrived().count(), made.len()),
+        with_way: [with_way().count(), with_way().filter(|(_, summary)| summary.arrived).count()],
         collisions: made.iter().map(|summary| summary.collisions).sum(),
         reasons,
         target_error_m: errors(|summary| summary.target_error_m),
@@ -278,6 +306,7 @@ mod tests {
             size: 256,
             samples_per_axis: 1,
             problem: None,
+            way_m: summary.map(|_| 8.1),
             summary,
         };
         let mut rows: Vec<DriveRow> =
@@ -287,6 +316,7 @@ mod tests {
         rows.push(row(Cell { slope_deg: 10.0, ..cell() }, Some(made(StopReason::Lost, 9.0))));
         let [found] = &grid.summaries(&rows)[..] else { panic!("one cell") };
         assert_eq!((found.drives, found.arrived, found.collisions), (4, 3, 1));
+        assert_eq!(found.with_way, [4, 3]);
         assert_eq!(found.target_error_m, Some([0.002, 0.003]));
         assert_eq!(found.reasons, BTreeMap::from([(StopReason::Stalled.word().to_owned(), 1)]));
         // A row is read back as it was written, with an outcome and without one.
@@ -306,6 +336,7 @@ mod tests {
             size: 256,
             samples_per_axis: 1,
             problem: None,
+            way_m: Some(8.1),
             summary: Some(made(StopReason::Arrived, 0.001)),
         };
         let folder = std::env::temp_dir();

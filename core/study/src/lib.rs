@@ -9,6 +9,7 @@
 //! wire        what page and server say to each other about studies
 //! randomised  approaches that the seed draws
 //! odometry    visual odometry in drives  drive_grid  drives on commands over slope, rocks, odometry, navigator
+//! true_ground  whether a way leads over the true ground   checkouts, k9_day   the papers' drives on commands
 //! ```
 
 pub mod calibration;
@@ -33,4 +34,7 @@ mod spread;
 pub mod row;
 pub mod odometry;
 pub mod drive_grid;
+pub mod checkouts;
+pub mod k9_day;
+pub mod true_ground;
 pub mod wire;

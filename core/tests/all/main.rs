@@ -19,6 +19,7 @@ mod terrain_odometry;
 mod stage_pause;
 mod stop_causes;
 mod visits;
+mod directed;
 mod faults;
 mod registration;
 mod stereo_rendered;

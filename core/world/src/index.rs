@@ -198,6 +198,18 @@ fn handed_over(last: &Stop, number: usize, settings: &CameraSettings) -> Option<
     })
 }
 
+/// A stop at which the further pair of this name, fixed to the body, takes over from the main one; the stop as it is without such a
+/// pair.
+pub(crate) fn seen_by_body(stop: Stop, number: usize, name: CameraName, rigs: &Rigs) -> Stop {
+    let Some((_, rig @ Rig::Body { .. })) = rigs.further.iter().find(|(known, _)| *known == name) else {
+        return stop;
+    };
+    let (left, right) = rig.cameras_in_rover(None);
+    let truth = stop.truth.map(|truth| StopTruth { left_camera: None, right_camera: None, ..truth });
+    let (left, right) = (view("left", number, left), view("right", number, right));
+    Stop { mast_angles: None, left, right, truth, ..stop }
+}
+
 /// One sentence for people.
 fn describe(scenario: &Scenario, stops: usize) -> String {
     let drive = &scenario.drive;

@@ -44,6 +44,8 @@ const FILES: &[(&str, &str)] = &[
     ("k9-5", include_str!("library/k9-5.toml")),
     ("k9-7.5", include_str!("library/k9-7.5.toml")),
     ("k9-10", include_str!("library/k9-10.toml")),
+    ("k9-day", include_str!("library/k9-day.toml")),
+    ("k9-day-shadow", include_str!("library/k9-day-shadow.toml")),
     ("heading-jump", include_str!("library/heading-jump.toml")),
 ];
 

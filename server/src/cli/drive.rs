@@ -16,7 +16,7 @@ use sightline_geometry::frames::Pixel;
 use sightline_recordings::replayed::Answer;
 use sightline_recordings::{DrivenTraverse, Traverse};
 use sightline_rover::driving::{
-    ArrivalAction, Cycle, DriveCommand, GoalRule, OdometryPair, PathChoice, SlipCheck, TrackedStops,
+    Cycle, DriveCommand, GoalRule, Motion, OdometryPair, PathChoice, SlipCheck, TrackedStops,
 };
 use sightline_session::driving::DriveSummary;
 use sightline_session::faults::{self, NewFault};
@@ -25,6 +25,7 @@ use sightline_session::step::RunStep;
 use sightline_session::stop_cause::StopExplanation;
 use sightline_session::targeted_drive::TargetedDrive;
 use sightline_session::visits::Visit;
+use sightline_track::locate::shape_tracker::placement::Placement;
 use sightline_track::presets::preset;
 use sightline_track::settings::{Changes, Settings, parse_assignment};
 use sightline_track::target::Designation;
@@ -106,6 +107,10 @@ pub(super) struct Drive {
     /// Time on Mars after which the drive stops, also during a motion, min.
     #[arg(long, value_name = "MIN", default_value_t = DriveCommand::default().flight_minutes_max)]
     minutes: f64,
+    /// Motions to drive one after the other instead of those to the goal: metres (0.5), `turn` and degrees (turn 20), or both
+    /// (0.5 turn 20), separated by commas.
+    #[arg(long, value_name = "MOTION,…", value_delimiter = ',', allow_hyphen_values = true)]
+    motions: Vec<Motion>,
     /// An action after arrival; can be given more than once.
     #[arg(long, value_name = "ACTION")]
     on_arrival: Vec<OnArrival>,
@@ -186,6 +191,9 @@ struct SummaryLine {
     visits: Vec<Visit>,
     /// The outcome, for the last target.
     summary: DriveSummary,
+    /// What the arm is told after a hand-off; absent without one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    placement: Option<Placement>,
     /// Why the drive stopped; absent where it has arrived.
     #[serde(skip_serializing_if = "Option::is_none")]
     why: Option<StopExplanation>,
@@ -305,7 +313,8 @@ impl Drive {
             },
             refusals_max: self.refusals_max,
             flight_minutes_max: self.minutes,
-            on_arrival: self.on_arrival.iter().map(|OnArrival::Look| ArrivalAction::Look).collect(),
+            motions: self.motions.clone(),
+            on_arrival: self.on_arrival.iter().map(|action| action.action()).collect(),
             ..DriveCommand::default()
         }
     }
@@ -336,7 +345,8 @@ fn follow(mut drive: TargetedDrive, settings: &Settings) -> Result<()> {
             if drive.visit_next() {
                 continue;
             }
-            return line(&SummaryLine { visits: drive.visits, summary, why });
+            let placement = drive.steps.last().and_then(|last| last.shape()?.placement);
+            return line(&SummaryLine { visits: drive.visits, summary, placement, why });
         }
         // The images of stops that were left behind are not needed any more.
         drive.steps[number] = Arc::new(without_images(&drive.steps[number]));

@@ -1,7 +1,7 @@
 //! The choices of `sightline drive`.
 
 use clap::ValueEnum;
-use sightline_rover::driving::NavigatorKind;
+use sightline_rover::driving::{ArrivalAction, NavigatorKind};
 use sightline_rover::visual_odometry::OdometryMode;
 
 /// An action after arrival.
@@ -9,6 +9,17 @@ use sightline_rover::visual_odometry::OdometryMode;
 pub(super) enum OnArrival {
     /// Point the mast at the target, take another pair and locate the target in it.
     Look,
+    /// Locate the target in the pair on the body.
+    HandOff,
+}
+
+impl OnArrival {
+    pub(super) const fn action(self) -> ArrivalAction {
+        match self {
+            Self::Look => ArrivalAction::Look,
+            Self::HandOff => ArrivalAction::HandOff,
+        }
+    }
 }
 
 /// What visual odometry is used for.

@@ -13,6 +13,7 @@ pub mod drive;
 pub mod drive_options;
 mod presets;
 mod study;
+mod study_commanded;
 mod study_drive_grid;
 mod study_odometry;
 mod export;

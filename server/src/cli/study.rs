@@ -13,6 +13,7 @@ use sightline_study::row::Row;
 use sightline_study::terrain_table;
 
 use super::open;
+use super::study_commanded::{CheckoutsStudy, K9DayStudy};
 use super::study_drive_grid::DriveGridStudy;
 use super::study_odometry::OdometryStudy;
 use super::terminal::{self, Progress};
@@ -66,6 +67,11 @@ enum Experiment {
     Odometry(OdometryStudy),
     /// Drives on commands over slope, rock coverage, use of visual odometry and navigator: which arrive, and why others do not.
     DriveGrid(DriveGridStudy),
+    /// The four checkouts on Mars as drives on commands, beside the paper's tables III and IV.
+    Checkouts(CheckoutsStudy),
+    /// The K9 rover's three targets in one drive on commands, each handed over to the hazcams.
+    #[command(name = "k9-day")]
+    K9Day(K9DayStudy),
 }
 
 /// Arguments of a study over worlds, configurations and a grid.
@@ -139,6 +145,8 @@ impl Study {
             Experiment::Recovery(arguments) => arguments.run("recovery"),
             Experiment::Odometry(arguments) => arguments.run(),
             Experiment::DriveGrid(arguments) => arguments.run(),
+            Experiment::Checkouts(arguments) => arguments.run(),
+            Experiment::K9Day(arguments) => arguments.run(),
         }
     }
 }

@@ -162,11 +162,13 @@ fn sentence(summary: &CellSummary) -> String {
         summary.reasons.iter().map(|(reason, count)| format!("{reason} {count}")).collect();
     let others = if reasons.is_empty() { String::new() } else { format!("; {}", reasons.join(", ")) };
     format!(
-        "slope {slope_deg}°, coverage {:.0} %, odometry {odometry:?}, {}: {} of {} arrived ({low:.0} to {high:.0} %){others}; {} collisions; target error {}, goal error {}",
+        "slope {slope_deg}°, coverage {:.0} %, odometry {odometry:?}, {}: {} of {} arrived ({low:.0} to {high:.0} %), with a way {} of {}{others}; {} collisions; target error {}, goal error {}",
         100.0 * coverage,
         navigator.name(),
         summary.arrived,
         summary.drives,
+        summary.with_way[1],
+        summary.with_way[0],
         summary.collisions,
         cm(summary.target_error_m),
         cm(summary.goal_error_m)

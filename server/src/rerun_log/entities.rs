@@ -185,6 +185,7 @@ const EVIDENCE: &[Evidence] = &[
     ("/{target}/locate/refine_register/covariance", "Ellipsoids3D", "the registration is used", |t| shape::registered(t).is_some()),
     ("/{target}/locate/hand_off/draped", "DepthImage", "the last picture was found at a hand-off", |t| shape::has(t, ArrayName::DRAPED)),
     ("/{target}/locate/hand_off/draped_match", "DepthImage", "the last picture was found at a hand-off", |t| shape::has(t, ArrayName::DRAPED_MATCH)),
+    ("/{target}/locate/hand_off/touch", "Points3D", "the arm can touch the surface near the target", |t| shape::touch(t).is_some()),
     ("/{target}/locate/left_covariance", "LineStrips2D", "designated or located", |t| t.located().is_some_and(|l| l.left_pixel.is_some())),
     ("/{target}/judge/state", "StateChange", "always", |_| true),
     ("/{target}/judge/verdict", "TextLog", "always", |_| true),

@@ -81,6 +81,7 @@
 //! | `/{target}/locate/refine_register/covariance` | `Ellipsoids3D` | the registration is used |
 //! | `/{target}/locate/hand_off/draped` | `DepthImage` | the last picture was found at a hand-off |
 //! | `/{target}/locate/hand_off/draped_match` | `DepthImage` | the last picture was found at a hand-off |
+//! | `/{target}/locate/hand_off/touch` | `Points3D` | the arm can touch the surface near the target |
 //! | `/{target}/locate/left_covariance` | `LineStrips2D` | designated or located |
 //! | `/{target}/judge/state` | `StateChange`, static `StateConfiguration` | always |
 //! | `/{target}/judge/verdict` | `TextLog` | always |
@@ -271,7 +272,8 @@ fn log_shape(step: &Step<'_>) -> Logged {
     shape::log_position(step)?;
     shape::log_covariance(step)?;
     shape::log_draped(step)?;
-    shape::log_draped_match(step)
+    shape::log_draped_match(step)?;
+    shape::log_touch(step)
 }
 
 #[cfg(test)]

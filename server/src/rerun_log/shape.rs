@@ -88,6 +88,17 @@ pub(super) fn log_draped_match(step: &Step<'_>) -> Logged {
     step.log("/{target}/locate/hand_off/draped_match", grey(step, ArrayName::DRAPED_MATCH))
 }
 
+/// After a hand-off, the point that the arm would touch.
+pub(super) fn log_touch(step: &Step<'_>) -> Logged {
+    let point = touch(step.trace).map(|at| dot_3d(step.in_site(&at), PREDICTION, "touch"));
+    step.log("/{target}/locate/hand_off/touch", point)
+}
+
+/// That point in the rover frame, m.
+pub(super) fn touch(trace: &StepTrace) -> Option<Point3> {
+    trace.shape()?.placement.as_ref()?.touch_in_rover.map(Point3::from)
+}
+
 /// The position by registration, accepted or not.
 pub(super) fn log_position(step: &Step<'_>) -> Logged {
     let point = registered(step.trace).map(|(at, _)| dot_3d(step.in_site(&at), MEASUREMENT, "registered"));

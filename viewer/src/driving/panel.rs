@@ -123,12 +123,21 @@ fn limits(ui: &mut Ui, command: &mut DriveCommand) {
         number(ui, "offset east", " m", east, (-20.0, 20.0), "Added to the goal");
         let stops = DragValue::new(&mut command.stops_max).range(2..=1000).prefix("stops ");
         ui.add(stops).accessible_name("stops").on_hover_text("Maximum number of stops, including the first");
-        let mut looks = command.on_arrival.len();
+        let mut looks = command.on_arrival.iter().filter(|action| **action == ArrivalAction::Look).count();
+        let mut hands_off = looks < command.on_arrival.len();
+        let before = (looks, hands_off);
         let drag = DragValue::new(&mut looks).range(0..=10).prefix("looks on arrival ");
         let help =
             "Stops at the goal at which the mast is pointed at the target again and another pair is taken";
         ui.add(drag).accessible_name("looks on arrival").on_hover_text(help);
-        command.on_arrival.resize(looks, ArrivalAction::Look);
+        ui.checkbox(&mut hands_off, "hand off on arrival").on_hover_text(
+            "Locates the target in the pair of hazcams, near the arm, after the looks. The configuration combined registers the \
+             surface there; it needs hazcams at every stop.",
+        );
+        if (looks, hands_off) != before {
+            command.on_arrival = vec![ArrivalAction::Look; looks];
+            command.on_arrival.extend(hands_off.then_some(ArrivalAction::HandOff));
+        }
         let presets = [OdometryPreset::Sightline, OdometryPreset::Mer2007];
         let pairs = [OdometryPair::Shared, OdometryPair::Own];
         let stops = [TrackedStops::Every, TrackedStops::ByDistance];

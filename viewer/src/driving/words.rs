@@ -98,6 +98,7 @@ pub(super) fn ending(ending: &Ending) -> String {
         StopReason::OdometryRefused => " updates in a row",
         StopReason::NoRangeData => " points",
         StopReason::Arrived
+        | StopReason::Completed
         | StopReason::Lost
         | StopReason::Stalled
         | StopReason::Slip

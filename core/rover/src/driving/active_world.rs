@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use sightline_geometry::camera::MastAngles;
+use sightline_geometry::camera::{CameraName, MastAngles};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
 use sightline_geometry::frames::Pixel;
@@ -31,6 +31,12 @@ pub trait ActiveWorld {
     /// # Errors
     /// A world that cannot be continued, or a stop that cannot be stored.
     fn stay(&mut self) -> Result<()>;
+
+    /// Adds a stop at which the rover stands as at the last one, and this pair on the body takes over from the main one.
+    ///
+    /// # Errors
+    /// As [`Self::stay`].
+    fn hand_over(&mut self, to: CameraName) -> Result<()>;
 
     /// Keeps the decision that led to the last stop, with the report of the drive; it is stored with the stop. A recording was
     /// driven by other decisions.

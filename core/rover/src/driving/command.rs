@@ -7,6 +7,7 @@ use sightline_geometry::camera::CameraName;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Point3;
 
+use super::motion::Motion;
 use super::odometry::OdometryPair;
 use super::select_path::{ArcNavigator, Navigator};
 use crate::navigation::{HazardNavigator, NavigatorPreset};
@@ -91,10 +92,16 @@ impl NavigatorKind {
 pub enum ArrivalAction {
     /// Points the mast at the located target, takes another pair and locates the target in it.
     Look,
+    /// Locates the target in the pair on the body, near the arm: that of `hazard_camera`, or the first one that looks ahead (R205).
+    HandOff,
 }
 
 /// Most actions after arrival.
 const ACTIONS_MAX: usize = 10;
+
+/// Most motions of a directed drive, and the longest of them, m.
+const MOTIONS_MAX: usize = 200;
+const MOTION_MAX_M: f64 = 20.0;
 
 /// The command of a targeted drive.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -127,7 +134,7 @@ pub struct DriveCommand {
     /// The navigator (`arcs`).
     pub navigator: NavigatorKind,
     /// The pair of every stop whose images give the hazard map, by its name (null: the first pair on the body that looks ahead).
-    /// With `arcs` it has no effect.
+    /// The target is handed over to it on arrival, too (`on_arrival`). With `arcs`, and without a hand-off, it has no effect.
     pub hazard_camera: Option<CameraName>,
     /// Ground nearer to the target counts as good on the hazard map, m (0: none; 0 to 5; Kim09 §6).
     pub exemption_radius_m: f64,
@@ -143,6 +150,10 @@ pub struct DriveCommand {
     pub tilt_max_deg: f64,
     /// The drive stops after this much time on Mars, min (480; 1 to 10,000). A motion during which it is used up is ended early.
     pub flight_minutes_max: f64,
+    /// Motions that are driven one after the other, as they are, instead of those to the goal: directed driving (none; 200 at most).
+    /// The drive has then ended with the last of them, and the target is tracked along.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub motions: Vec<Motion>,
     /// Actions after arrival, in this order (none; 10 at most). Each is one more stop, at which the rover stays.
     pub on_arrival: Vec<ArrivalAction>,
 }
@@ -169,6 +180,7 @@ impl Default for DriveCommand {
             refusals_max: None,
             tilt_max_deg: 30.0,
             flight_minutes_max: 480.0,
+            motions: Vec::new(),
             on_arrival: Vec::new(),
         }
     }
@@ -197,6 +209,13 @@ impl DriveCommand {
         within("refusals_max", f64::from(self.refusals_max.unwrap_or(0)), 0.0, 1000.0)?;
         within("tilt_max_deg", self.tilt_max_deg, 1.0, 45.0)?;
         within("flight_minutes_max", self.flight_minutes_max, 1.0, 10_000.0)?;
+        within("motions (number of motions)", self.motions.len() as f64, 0.0, MOTIONS_MAX as f64)?;
+        for (index, motion) in self.motions.iter().enumerate() {
+            let (length_m, turn_rad) = motion.length_and_turn();
+            within(&format!("motions[{index}]: length in m"), length_m, -MOTION_MAX_M, MOTION_MAX_M)?;
+            let turn_deg = turn_rad.to_degrees();
+            within(&format!("motions[{index}]: turn in deg"), turn_deg, -360.0, 360.0)?;
+        }
         let looks = self.on_arrival.len();
         if looks <= ACTIONS_MAX && looks + 2 > self.stops_max as usize {
             let problem = format!(
@@ -216,8 +235,16 @@ impl DriveCommand {
         Ok(())
     }
 
-    /// Whether another command has the same goal for the same target.
+    /// Whether the rover drives given motions instead of those to a goal.
+    pub fn is_directed(&self) -> bool {
+        !self.motions.is_empty()
+    }
+
+    /// Whether another command has the same goal for the same target, or the same motions.
     pub fn has_goal_of(&self, other: &Self) -> bool {
+        if self.motions != other.motions {
+            return false;
+        }
         let goal = |of: &Self| (of.standoff_m, of.offset_m, of.since, of.goal, of.tolerance_m);
         goal(self) == goal(other)
     }
@@ -228,8 +255,8 @@ impl DriveCommand {
     /// [`Error::Setting`] for a target behind the rover or nearer than the standoff, where it is the first one.
     pub fn validate_for(&self, target_in_rover: &Point3) -> Result<()> {
         self.validate()?;
-        if self.since.is_some() {
-            // The rover has moved since the designation.
+        if self.since.is_some() || self.is_directed() {
+            // The rover has moved since the designation, or does not go to the target.
             return Ok(());
         }
         let distance_m = target_in_rover.x.hypot(target_in_rover.y);
@@ -275,6 +302,11 @@ mod tests {
             (|c| (c.standoff_m, c.tolerance_m) = (0.5, 0.5), ahead, "tolerance_m"),
             (|c| c.step_fraction = 0.0, ahead, "step_fraction"),
             (|c| c.stops_max = 1, ahead, "stops_max"),
+            (
+                |c| c.motions = vec![Motion::Arc { length_m: 30.0, curvature_per_m: 0.0 }],
+                ahead,
+                "motions[0]: length in m: 30 is outside -20 to 20",
+            ),
             (|c| c.slip_max = 0.0, ahead, "slip_max"),
             (|c| c.on_arrival = vec![ArrivalAction::Look; 11], ahead, "on_arrival"),
             (

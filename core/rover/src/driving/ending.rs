@@ -3,14 +3,15 @@
 //! | order | reason | check |
 //! |---|---|---|
 //! | 1 | `arrived` | distance to the goal within the tolerance, or an action after arrival was begun |
-//! | 2 | `lost` | the tracker gave the target up, and the goal follows it |
+//! | 1 | `completed` | in its place in a directed drive: all its motions were driven |
+//! | 2 | `lost` | the tracker gave the target up, and the goal follows it; not in a directed drive |
 //! | 3 | `stalled` | a wheel stalled on the way to this stop |
 //! | 4 | `slip` | measured slip of the motion to this stop against `slip_max`, of what `slip_check` names |
 //! | 5 | `odometry_refused` | consecutive refused updates of visual odometry against `refusals_max` |
 //! | 6 | `tilt` | tilt against `tilt_max_deg` |
 //! | 7 | `time` | time on Mars against `flight_minutes_max` |
 //! | 8 | `stop_limit` | number of stops against `stops_max` |
-//! | 9 | `limit_cycle` | visits to this place (`limit_cycle.rs`) |
+//! | 9 | `limit_cycle` | visits to this place (`limit_cycle.rs`); not in a directed drive |
 //!
 //! The remaining reasons follow from the selection of the path (`next_motion.rs`).
 
@@ -32,6 +33,8 @@ use crate::pipeline::Stops;
 pub enum StopReason {
     /// The rover is within the tolerance of the goal.
     Arrived,
+    /// All motions of a directed drive were driven.
+    Completed,
     /// The tracker gave the target up.
     Lost,
     /// A wheel met a step too high to climb.
@@ -59,13 +62,22 @@ pub enum StopReason {
 impl StopReason {
     /// Whether it concerns one target alone: another one can be driven to from there.
     pub const fn is_of_target(self) -> bool {
-        matches!(self, Self::Arrived | Self::Lost | Self::LimitCycle | Self::NoSafePath | Self::GoalBlocked)
+        matches!(
+            self,
+            Self::Arrived
+                | Self::Completed
+                | Self::Lost
+                | Self::LimitCycle
+                | Self::NoSafePath
+                | Self::GoalBlocked
+        )
     }
 
     /// The reason in words.
     pub const fn word(self) -> &'static str {
         match self {
             Self::Arrived => "arrived",
+            Self::Completed => "all motions driven",
             Self::Lost => "target lost",
             Self::Stalled => "a wheel stalled at a rock",
             Self::Slip => "slipped too much",
@@ -86,8 +98,8 @@ impl StopReason {
 pub struct Ending {
     /// Why it stopped.
     pub reason: StopReason,
-    /// The value that decided, in the unit of its limit: m, a part, deg, min, a count; null for `lost`, `stalled`, `limit_cycle`
-    /// and `no_safe_path`, and for a missing pair; of `goal_blocked` that of the ground at the goal.
+    /// The value that decided, in the unit of its limit: m, a part, deg, min, a count; null for `completed`, `lost`, `stalled`,
+    /// `limit_cycle` and `no_safe_path`, and for a missing pair; of `goal_blocked` that of the ground at the goal.
     pub value: Option<f64>,
     /// The limit that it met; null where `value` is.
     pub limit: Option<f64>,
@@ -114,12 +126,17 @@ pub(super) fn ending(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &Cycle) -
     let command = input.command;
     let end = |reason, value: f64, limit: f64| Some(Ending::beyond(reason, value, limit));
     let named = |reason| Some(Ending::named(reason, None));
+    if has_driven_all(input, cycle) {
+        return named(StopReason::Completed);
+    }
     // A later look may put the goal a little elsewhere; the rover has arrived all the same.
-    if (cycle.goal.arrived && input.last.why_not_searched().is_none()) || cycle.arrival_actions > 0 {
+    let is_at_goal = cycle.goal.arrived && input.last.why_not_searched().is_none();
+    if !command.is_directed() && (is_at_goal || cycle.arrival_actions > 0) {
         return end(StopReason::Arrived, cycle.goal.distance_m, command.tolerance_m);
     }
     // The baseline drives on whatever tracking makes of it.
-    if command.goal == GoalRule::FollowsTarget && input.last.update.state == TrackingState::Failed {
+    let follows = command.goal == GoalRule::FollowsTarget && !command.is_directed();
+    if follows && input.last.update.state == TrackingState::Failed {
         return named(StopReason::Lost);
     }
     if let Some(report) = input.before.and_then(|before| before.report) {
@@ -145,9 +162,23 @@ pub(super) fn ending(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &Cycle) -
     if count >= command.stops_max as usize {
         return end(StopReason::StopLimit, count as f64, f64::from(command.stops_max));
     }
+    if command.is_directed() {
+        return None;
+    }
     let visits = visits(stops, [input.since(), cycle.step]);
     (visits.len() >= limit_cycle::VISITS_MAX)
         .then(|| Ending::named(StopReason::LimitCycle, Some(limit_cycle::sentence(&visits))))
+}
+
+/// Whether all motions of a directed drive were driven; one that a rock or the time cut off has its own reason.
+pub(super) fn has_driven_all(input: &CycleInput<'_>, cycle: &Cycle) -> bool {
+    let is_whole = |before: &Cycle| {
+        before.time_up_after.is_none() && before.report.is_none_or(|report| report.stall.is_none())
+    };
+    let command = input.command;
+    command.is_directed()
+        && cycle.motions_begun as usize >= command.motions.len()
+        && (cycle.arrival_actions > 0 || input.before.is_none_or(is_whole))
 }
 
 /// The first stop of each visit, among the stops `first` to `last`, to the place where the rover stands at `last`.

@@ -18,9 +18,9 @@ use sightline_track::trace::StepTrace;
 use super::active_world::{ActiveWorld, DriveReport, FollowedCycle};
 use super::command::{ArrivalAction, DriveCommand, GoalRule};
 use super::dead_reckoning::Reckoned;
-use super::ending::{Ending, ending};
+use super::ending::{Ending, ending, has_driven_all};
 use super::flight_time::{FlightTime, drive_s};
-use super::map_hazards::StopHazards;
+use super::map_hazards::{StopHazards, body_pair};
 use super::motion::Motion;
 use super::next_motion;
 use super::odometry::{self, OdometryPair};
@@ -59,6 +59,12 @@ pub struct Cycle {
     pub report: Option<DriveReport>,
     /// Actions after arrival that were begun, the one decided here included.
     pub arrival_actions: u32,
+    /// Motions of a directed drive that were begun, the one decided here included.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub motions_begun: u32,
+    /// The action after arrival that was decided here; null for none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub action: Option<ArrivalAction>,
     /// Time of this stop on Mars, by stage.
     pub flight: FlightTime,
     /// Time on Mars up to the end of this stop's drive, min.
@@ -153,6 +159,10 @@ pub fn drive(world: &mut dyn ActiveWorld, input: &CycleInput<'_>, cancel: Cancel
                 world.leave_to_odometry()?;
             }
         }
+        None if cycle.action == Some(ArrivalAction::HandOff) => {
+            let to = body_pair(world.stops(), cycle.step, input.command)?;
+            world.hand_over(to)?;
+        }
         None => world.stay()?,
     }
     let designation = input.first.update.target.designation;
@@ -173,9 +183,6 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
     if input.last.why_not_searched().is_some() {
         time = time.without_tracking(input.command.odometry_pair);
     }
-    if let Some(sizes) = input.hazards.and_then(|hazards| hazards.image_sizes) {
-        time = time.with_hazards(sizes);
-    }
     let flight_minutes = input.before.map_or(0.0, |before| before.flight_minutes) + time.total_s() / 60.0;
     let before_here = input.before.filter(|before| before.step >= input.since());
     let arrival_actions = before_here.map_or(0, |before| before.arrival_actions);
@@ -192,6 +199,8 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
         choice: None,
         report: None,
         arrival_actions,
+        motions_begun: before_here.map_or(0, |before| before.motions_begun),
+        action: None,
         flight: time,
         flight_minutes,
         ending: None,
@@ -201,20 +210,43 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
         cycle.ending = ending(stops, input, &cycle);
         return cycle;
     }
-    let has_arrived = (goal.arrived && !input.last.is_odometry_alone()) || arrival_actions > 0;
+    let is_there = if input.command.is_directed() {
+        has_driven_all(input, &cycle)
+    } else {
+        goal.arrived && !input.last.is_odometry_alone()
+    };
+    let has_arrived = is_there || arrival_actions > 0;
     let action = input.command.on_arrival.get(arrival_actions as usize).filter(|_| has_arrived);
-    if let Some(ArrivalAction::Look) = action {
+    if action.is_some() {
         cycle.arrival_actions += 1;
+        cycle.action = action.copied();
         return cycle;
     }
     cycle.ending = ending(stops, input, &cycle);
+    if cycle.ending.is_some() {
+        return cycle;
+    }
+    if let Some(motion) = input.command.motions.get(cycle.motions_begun as usize) {
+        cycle.motion = Some(*motion);
+        cycle.motions_begun += 1;
+        return cycle;
+    }
     // Where odometry alone brought the rover to the goal, it stays for the tracker.
-    if cycle.ending.is_none() && !goal.arrived {
+    if !goal.arrived {
         let target_in_rover = pose.inverse_transform_point(&target_in_site);
         let distance_m = (target_in_rover - left.model.centre()).norm();
         next_motion::choose(stops, input, &mut cycle, distance_m);
+        if cycle.choice.is_some() {
+            cycle.flight = time.with_hazards();
+            cycle.flight_minutes += (cycle.flight.total_s() - time.total_s()) / 60.0;
+        }
     }
     cycle
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
+fn is_zero(count: &u32) -> bool {
+    *count == 0
 }
 
 /// The place at this stop by the pose estimates and by the wheels alone.

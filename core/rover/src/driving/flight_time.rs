@@ -6,7 +6,7 @@
 //! | capture | 30 s for a 12-bit 1024 × 1024 pair, less with fewer pixels, 5 s at least | R148 |
 //! | locate | 5 s: correlation 4 s, point stereo 1 s | R147 |
 //! | visual odometry | 90 s for each update, and point_mast and capture for a pair of its own | R149 |
-//! | select_path | the pair of the hazard map, as capture; the map itself is not included | ours |
+//! | select_path | 300 s with a hazard map: its pair, the map and the path | R149 |
 //! | drive | 3.75 cm/s, 2.1°/s | domain.md 5.4 |
 //!
 //! Unit: s.
@@ -26,6 +26,8 @@ const CAPTURE_PX: f64 = 2.0 * 1024.0 * 1024.0;
 const CAPTURE_MIN_S: f64 = 5.0;
 /// Turning the mast, s.
 const POINT_MAST_S: f64 = 5.0;
+/// One update of the navigator: pair, hazard map and path, s.
+const HAZARDS_S: f64 = 300.0;
 /// One update of visual odometry, s.
 const ODOMETRY_S: f64 = 90.0;
 /// Speed of the rover, m/s (domain.md 5.4).
@@ -45,7 +47,7 @@ pub struct FlightTime {
     pub capture_s: f64,
     /// Finding the target.
     pub locate_s: f64,
-    /// Exposing and transferring the pair of the hazard map; 0 without one. The computation of the map is not included.
+    /// Pair, hazard map and path; 0 without a hazard map.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub hazards_s: f64,
     /// Driving to the next stop.
@@ -91,9 +93,9 @@ impl FlightTime {
         }
     }
 
-    /// The same of a stop with a pair for the hazard map, whose images have these sizes, px.
-    pub(crate) fn with_hazards(self, image_sizes: [[u32; 2]; 2]) -> Self {
-        Self { hazards_s: capture_s(image_sizes), ..self }
+    /// The same of a stop at which a path is chosen on a hazard map.
+    pub(crate) const fn with_hazards(self) -> Self {
+        Self { hazards_s: HAZARDS_S, ..self }
     }
 
     /// The same of a stop at which odometry runs alone, in the pair that the tracker would have or in one of its own.

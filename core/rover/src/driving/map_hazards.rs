@@ -20,7 +20,7 @@ use super::command::DriveCommand;
 use crate::hazards::{
     GoodnessMap, HazardMap, HazardSettings, MapRules, Scan, assess, map_hazards, range_noise, range_points,
 };
-use crate::pair::{self, FurtherCamera};
+use crate::pair::FurtherCamera;
 use crate::pipeline::Stops;
 
 /// The outcome of the pair of a stop.
@@ -39,8 +39,6 @@ pub struct StopHazards {
     pub step: usize,
     /// Range data of the stop.
     pub range: RangeData,
-    /// Sizes of the two images, px; `None` without a pair.
-    pub image_sizes: Option<[[u32; 2]; 2]>,
     /// The goodness map.
     pub map: GoodnessMap,
 }
@@ -60,13 +58,18 @@ impl StopHazards {
 /// # Errors
 /// [`Error::Setting`] for a stop without such a pair.
 pub fn hazard_camera(stops: &dyn Stops, step: usize, command: &DriveCommand) -> Result<Option<CameraName>> {
-    if !command.navigator.needs_map() {
-        return Ok(None);
-    }
+    if command.navigator.needs_map() { body_pair(stops, step, command).map(Some) } else { Ok(None) }
+}
+
+/// The pair on the body that a command names, or else the first one that looks ahead, for the hazard map and the hand-off.
+///
+/// # Errors
+/// [`Error::Setting`] for a stop without such a pair.
+pub fn body_pair(stops: &dyn Stops, step: usize, command: &DriveCommand) -> Result<CameraName> {
     let cameras = stops.further_cameras(step);
     if let Some(name) = command.hazard_camera {
         if cameras.iter().any(|camera| camera.name == name && camera.right.is_some()) {
-            return Ok(Some(name));
+            return Ok(name);
         }
         let problem = format!("stop {step} has no pair `{name}`; {}", choices(&cameras));
         return Err(Error::setting("hazard_camera", problem));
@@ -75,11 +78,17 @@ pub fn hazard_camera(stops: &dyn Stops, step: usize, command: &DriveCommand) -> 
         camera.right.is_some() && camera.mast_angles.is_none() && camera.left.model.axis().x > 0.0
     };
     if let Some(camera) = cameras.iter().find(is_hazcam) {
-        return Ok(Some(camera.name));
+        return Ok(camera.name);
+    }
+    let add = "add one with rig mer_front_hazcam to camera.further of the scenario";
+    if !command.navigator.needs_map() {
+        let problem =
+            format!("`hand_off` needs a pair of hazcams, and this drive has none; {add}, or leave it out");
+        return Err(Error::setting("on_arrival", problem));
     }
     let problem = format!(
-        "`{}` needs a pair of hazcams at every stop, and this drive has none; add one with rig mer_front_hazcam to camera.further \
-         of the scenario, name another pair as hazard_camera, or choose `arcs`",
+        "`{}` needs a pair of hazcams at every stop, and this drive has none; {add}, name another pair as hazard_camera, or \
+         choose `arcs`",
         command.navigator.name()
     );
     Err(Error::setting("navigator", problem))
@@ -99,7 +108,6 @@ fn choices(cameras: &[FurtherCamera<'_>]) -> String {
 struct Mapped {
     site_from_rover: Pose,
     range: RangeData,
-    image_sizes: Option<[[u32; 2]; 2]>,
     /// The last goodness map that was requested, and its rules.
     assessed: Option<(MapRules, Arc<StopHazards>)>,
 }
@@ -159,7 +167,6 @@ impl HazardMaps {
         let hazards = Arc::new(StopHazards {
             step: last.step,
             range: mapped.range.clone(),
-            image_sizes: mapped.image_sizes,
             map: assess(map, &rules, &self.settings),
         });
         mapped.assessed = Some((rules, Arc::clone(&hazards)));
@@ -194,8 +201,6 @@ impl HazardMaps {
         cancel: Cancel<'_>,
     ) -> Result<()> {
         cancel.check()?;
-        let sizes = |pair: &pair::StopPair<'_>| [pair.left.size, pair.right.size];
-        let image_sizes = stops.further_pair(step, camera).ok().as_ref().map(sizes);
         let (points, range) = match self.points(stops, (camera, step), cancel)? {
             Ok(points) => {
                 let range = RangeData::Points(points.len());
@@ -218,7 +223,7 @@ impl HazardMaps {
             noise,
         };
         self.map = Some(map_hazards(self.map.as_ref(), &scan, &self.settings));
-        self.stops.push(Mapped { site_from_rover, range, image_sizes, assessed: None });
+        self.stops.push(Mapped { site_from_rover, range, assessed: None });
         Ok(())
     }
 

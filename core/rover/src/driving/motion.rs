@@ -9,7 +9,15 @@
 //! | s, κ | part of `length_m`, `curvature_per_m` (positive to the right) | m, 1/m |
 //! | x, y, ψ | position ahead and to the right of the start, heading | m, rad |
 //!
+//! As text, of a list of motions: `0.5` (m, straight; negative: back), `turn 20` (deg, positive to the right), `0.5 turn 20` (an arc of
+//! 0.5 m that turns by 20°).
+//!
 //! Frame: rover at the start of the motion, horizontal.
+
+use std::fmt;
+use std::str::FromStr;
+
+use sightline_geometry::error::Error;
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -41,6 +49,14 @@ impl Motion {
         }
     }
 
+    /// Length of the path, m, and turn, rad, positive to the right.
+    pub fn length_and_turn(&self) -> (f64, f64) {
+        match *self {
+            Self::Arc { length_m, curvature_per_m } => (length_m, length_m * curvature_per_m),
+            Self::Turn { angle_rad } => (0.0, angle_rad),
+        }
+    }
+
     /// The first part of the motion, 0 to 1.
     pub(super) fn part(&self, part: f64) -> Self {
         match *self {
@@ -68,9 +84,59 @@ impl Motion {
     }
 }
 
+impl FromStr for Motion {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        let problem = || {
+            let sentence = format!(
+                "`{text}` is not a motion: write metres (0.5), `turn` and degrees (turn 20), or both (0.5 turn 20)"
+            );
+            Error::setting("motions", sentence)
+        };
+        let number =
+            |word: &str| word.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(problem);
+        match text.split_whitespace().collect::<Vec<_>>()[..] {
+            [length] => Ok(Self::Arc { length_m: number(length)?, curvature_per_m: 0.0 }),
+            ["turn", angle] => Ok(Self::Turn { angle_rad: number(angle)?.to_radians() }),
+            [length, "turn", angle] => {
+                let (length_m, angle_rad) = (number(length)?, number(angle)?.to_radians());
+                let curvature_per_m = angle_rad / length_m;
+                if length_m == 0.0 { Err(problem()) } else { Ok(Self::Arc { length_m, curvature_per_m }) }
+            }
+            _ => Err(problem()),
+        }
+    }
+}
+
+impl fmt::Display for Motion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // Three decimals, without those that are 0.
+        let short = |value: f64| (value * 1e3).round() / 1e3 + 0.0;
+        match *self {
+            Self::Turn { angle_rad } => write!(f, "turn {}", short(angle_rad.to_degrees())),
+            Self::Arc { length_m, curvature_per_m: 0.0 } => write!(f, "{}", short(length_m)),
+            Self::Arc { length_m, curvature_per_m } => {
+                write!(f, "{} turn {}", short(length_m), short((length_m * curvature_per_m).to_degrees()))
+            }
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_motion_is_read_as_it_is_written_and_nonsense_is_refused() {
+        for text in ["0.5", "-1.4", "turn 20", "turn -18.5", "0.1 turn -10", "-0.1 turn 10"] {
+            assert_eq!(text.parse::<Motion>().unwrap().to_string(), text);
+        }
+        for text in ["", "ahead", "turn", "0.5 turn", "turn 20 0.5", "0 turn 5", "NaN", "1 2"] {
+            let told = text.parse::<Motion>().unwrap_err().to_string();
+            assert!(told.contains(&format!("`{text}` is not a motion")), "{told}");
+        }
+    }
 
     #[test]
     fn the_end_of_a_motion_is_that_of_many_small_ones() {
@@ -80,10 +146,7 @@ mod tests {
             Motion::Arc { length_m: 1.5, curvature_per_m: 0.0 },
             Motion::Turn { angle_rad: -0.8 },
         ] {
-            let (length_m, turn_rad) = match motion {
-                Motion::Arc { length_m, curvature_per_m } => (length_m, length_m * curvature_per_m),
-                Motion::Turn { angle_rad } => (0.0, angle_rad),
-            };
+            let (length_m, turn_rad) = motion.length_and_turn();
             let (mut place, mut heading_rad) = ([0.0f64; 2], 0.0f64);
             for _ in 0..100_000 {
                 let half = heading_rad + 0.5e-5 * turn_rad;

@@ -16,7 +16,7 @@ use sightline_geometry::frames::Pose;
 
 use super::active_world::ActiveWorld;
 use super::command::DriveCommand;
-use crate::pipeline::Stops;
+use crate::pipeline::{Stops, has_stayed};
 use crate::visual_odometry::look::{is_back, look, look_back};
 use crate::visual_odometry::{MeasuredMotion, OdometryMode};
 
@@ -43,11 +43,10 @@ pub fn run(
     cancel: Cancel<'_>,
 ) -> Result<()> {
     let stops = world.stops();
-    let has_stayed = stops.site_from_rover(step) == stops.site_from_rover(step - 1);
     // Without images the pose stays that of wheels, gyro and accelerometers.
     let is_blind = [step - 1, step].into_iter().any(|step| stops.has_dropped_out(step));
     if command.odometry == OdometryMode::Off
-        || has_stayed
+        || has_stayed(stops, step)
         || is_blind
         || stops.measured_motion(step).is_some()
     {

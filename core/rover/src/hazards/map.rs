@@ -65,6 +65,8 @@ pub struct HazardMap {
     pub(super) driven_m: f64,
     /// By slot.
     cells: Vec<Moments>,
+    /// z of the highest point of each cell, by slot, from the reference, m; infinite without one.
+    highest_m: Vec<f64>,
 }
 
 /// Stage 8, `map_hazards`: the map of the stop before, moved and decayed, with the points of this one. The map begins anew
@@ -79,6 +81,7 @@ pub fn map_hazards(before: Option<&HazardMap>, scan: &Scan<'_>, settings: &Hazar
             height_m: origin.z,
             driven_m: scan.driven_m,
             cells: vec![Moments::default(); grid.len()],
+            highest_m: vec![f64::INFINITY; grid.len()],
         },
     };
     map.add(scan, settings);
@@ -92,20 +95,36 @@ impl HazardMap {
         &self.cells[self.grid.slot(row, column)]
     }
 
+    /// z of a cell as an obstacle, from the reference, m: its mean, or, for points that spread along z more than those of ground
+    /// do, as on the face of a rock, the face's upper edge; not finite without points. See `steps.rs`.
+    pub(super) fn obstacle_height_m(&self, row: usize, column: usize, face_spread_m: f64) -> f64 {
+        let slot = self.grid.slot(row, column);
+        let cell = &self.cells[slot];
+        let (mean_m, spread_m) = (cell.mean_height_m(), cell.spread_m());
+        // z is down.
+        if spread_m > face_spread_m {
+            (mean_m - 3f64.sqrt() * spread_m).max(self.highest_m[slot])
+        } else {
+            mean_m
+        }
+    }
+
     /// The map in another window, after a distance.
     fn moved(&self, grid: Grid, driven_m: f64, settings: &HazardSettings) -> Self {
         let factor = 0.5_f64.powf((driven_m - self.driven_m).max(0.0) / settings.half_life_m);
         let mut cells = vec![Moments::default(); grid.len()];
+        let mut highest_m = vec![f64::INFINITY; grid.len()];
         for row in 0..grid.side {
             for column in 0..grid.side {
                 let slot = grid.slot(row, column);
                 if grid.is_in(row, column, &self.grid) && self.cells[slot].count() * factor >= FORGOTTEN {
                     cells[slot] = self.cells[slot];
                     cells[slot].scale(factor);
+                    highest_m[slot] = self.highest_m[slot];
                 }
             }
         }
-        Self { grid, height_m: self.height_m, driven_m, cells }
+        Self { grid, height_m: self.height_m, driven_m, cells, highest_m }
     }
 
     fn add(&mut self, scan: &Scan<'_>, settings: &HazardSettings) {
@@ -120,6 +139,7 @@ impl HazardMap {
             let relative = [point.x - centre[0], point.y - centre[1], point.z - self.height_m];
             let slot = self.grid.slot(row, column);
             self.cells[slot].add(relative, scan.driven_m, variance_m2);
+            self.highest_m[slot] = self.highest_m[slot].min(relative[2]);
         }
     }
 }
@@ -130,7 +150,8 @@ struct Stored {
     grid: Grid,
     height_m: f64,
     driven_m: f64,
-    cells: Vec<(u32, [f64; SUMS])>,
+    /// Slot, sums, and z of the highest point.
+    cells: Vec<(u32, [f64; SUMS], f64)>,
 }
 
 /// Most cells along a side of a stored map.
@@ -139,7 +160,7 @@ const SIDE_MAX: usize = 2000;
 impl From<HazardMap> for Stored {
     fn from(map: HazardMap) -> Self {
         let known = map.cells.iter().enumerate().filter(|(_, cell)| cell.count() > 0.0);
-        let cells = known.map(|(slot, cell)| (slot as u32, cell.0)).collect();
+        let cells = known.map(|(slot, cell)| (slot as u32, cell.0, map.highest_m[slot])).collect();
         Self { grid: map.grid, height_m: map.height_m, driven_m: map.driven_m, cells }
     }
 }
@@ -156,12 +177,14 @@ impl TryFrom<Stored> for HazardMap {
             )));
         }
         let mut cells = vec![Moments::default(); grid.len()];
-        for (slot, sums) in known {
+        let mut highest_m = vec![f64::INFINITY; grid.len()];
+        for (slot, sums, top_m) in known {
             let Some(cell) = cells.get_mut(slot as usize) else {
                 return Err(Error::Request(format!("a hazard map has no cell {slot}")));
             };
             *cell = Moments(sums);
+            highest_m[slot as usize] = top_m;
         }
-        Ok(Self { grid, height_m, driven_m, cells })
+        Ok(Self { grid, height_m, driven_m, cells, highest_m })
     }
 }

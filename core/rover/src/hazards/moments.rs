@@ -60,6 +60,12 @@ impl Moments {
         self.0[3] / self.0[0]
     }
 
+    /// Spread of the heights beyond their expected error, 1σ, m; not a number without points.
+    pub(super) fn spread_m(&self) -> f64 {
+        let mean_m = self.mean_height_m();
+        (self.0[9] / self.0[0] - mean_m * mean_m - self.variance_m2()).max(0.0).sqrt()
+    }
+
     /// The sum of the distances driven at the observations, m.
     #[inline]
     pub(super) fn odometer_m(&self) -> f64 {

@@ -31,6 +31,8 @@ settings_group! {
         step_ok_m: f64 = 0.08, "m", Domain::Between(0.0, 1.0), "ours, after Goldberg02";
         /// Step from which on the goodness is 0.
         step_bad_m: f64 = 0.20, "m", Domain::Between(0.001, 2.0), "ours, after Goldberg02";
+        /// The heights of a cell's points spread by more: they are on the face of an obstacle, which is as high as its upper edge.
+        face_spread_m: f64 = 0.05, "m", Domain::Between(0.0, 2.0), "ours; docs/driving.md";
         /// Points in the disc from which on their number does not reduce the certainty.
         points_full: f64 = 40.0, "", Domain::Between(3.0, 10_000.0), "ours, after Goldberg02";
         /// A cell is known if its decayed number of points is at least this.

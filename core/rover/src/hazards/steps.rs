@@ -1,14 +1,20 @@
-//! Steps: the largest difference of the mean heights of two cells near each other, both inside the disc.
+//! Steps: the largest difference of the heights of two cells near each other, both inside the disc.
 //!
 //! ```text
-//! step(p) = max (|z̄(c) − z̄(c + o)| − k √(σ²(c) + σ²(c + o)))      c ∈ D_p ∩ (D_p − o),  0 < |o| ≤ reach
+//! step(p) = max (|h(c) − h(c + o)| − k √(σ²(c) + σ²(c + o)))      c ∈ D_p ∩ (D_p − o),  0 < |o| ≤ reach
+//! s²(c)   = Σz²/n − z̄² − σ²(c)
+//! h(c)    = max(z̄(c) − √3 s(c), z_top(c)) where s(c) > face_spread_m, else z̄(c)
 //! ```
+//! A camera near the ground sees the face of a rock, and little of its top. The points of a face spread evenly from its foot to
+//! its upper edge: by s = H/√12 for a height H, and z̄ is half way up (z down). No point is above that edge, z_top.
+//!
 //! For each offset o the differences form one image, and the maximum over the intersection of both discs is taken row by
 //! row: a run of l cells is covered by two runs of 2^k ≤ l, whose maxima are computed once for the whole image.
 //!
 //! | symbol | meaning |
 //! |---|---|
-//! | z̄(c), σ²(c) | mean height of the points of cell c, m, and its expected variance, m² |
+//! | z̄(c), σ²(c) | mean height of the n points of cell c, m, and its expected variance, m² |
+//! | s(c) | spread of their heights beyond that error, m |
 //! | k | `step_sigmas` |
 //! | D_p | disc of the rover's radius around cell p |
 //!
@@ -25,8 +31,11 @@ pub(super) fn steps(map: &HazardMap, disc: &Disc, reach: &Disc, settings: &Hazar
     let side = map.grid.side;
     let heights: Vec<f32> = (0..side * side)
         .map(|index| {
-            let cell = map.cell(index / side, index % side);
-            if cell.count() >= settings.weight_min { cell.mean_height_m() as f32 } else { f32::NAN }
+            let (row, column) = (index / side, index % side);
+            if map.cell(row, column).count() < settings.weight_min {
+                return f32::NAN;
+            }
+            map.obstacle_height_m(row, column, settings.face_spread_m) as f32
         })
         .collect();
     let k2 = settings.step_sigmas.powi(2);
@@ -58,7 +67,7 @@ fn raise(values: &mut [f32], others: &[f32]) {
     }
 }
 
-/// The cells row by row: mean heights, m, NaN where unknown, and k² times their variances, m².
+/// The cells row by row: heights, m, NaN where unknown, and k² times their variances, m².
 struct Cells {
     heights: Vec<f32>,
     variances: Vec<f32>,
@@ -90,7 +99,7 @@ fn largest(cells: &Cells, offset: [isize; 2], disc: &Disc) -> Vec<f32> {
     steps
 }
 
-/// By how much |z̄(c) − z̄(c + o)| exceeds its error, with a margin of zeros on both sides of every row; 0 if one of the cells is
+/// By how much |h(c) − h(c + o)| exceeds its error, with a margin of zeros on both sides of every row; 0 if one of the cells is
 /// unknown.
 fn differences(cells: &Cells, [down, along]: [isize; 2], margin: usize) -> Vec<f32> {
     let side = cells.side;

@@ -118,7 +118,7 @@ impl MeasuredMotion {
     }
 
     /// Updates that were computed.
-    pub(crate) fn updates(&self) -> u32 {
+    pub fn updates(&self) -> u32 {
         1 + u32::from(self.refused_too.is_some())
     }
 

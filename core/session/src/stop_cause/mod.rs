@@ -106,7 +106,7 @@ impl Explained {
         maps: &mut HazardMaps,
     ) -> Option<StopExplanation> {
         let ending = cycles.last()?.ending.as_ref()?;
-        if ending.reason == StopReason::Arrived {
+        if matches!(ending.reason, StopReason::Arrived | StopReason::Completed) {
             return None;
         }
         if let Some((known, decided, explanation)) = &self.last

@@ -188,6 +188,8 @@ pub struct LocateInput<'a> {
     pub place: Place,
     /// Updates in a row that were bad so far.
     pub lost_count: u32,
+    /// Whether the target was found at the stop before.
+    pub was_found: bool,
     /// The configuration.
     pub settings: &'a Settings,
     /// Once requested, the tracker returns anything soon: the sighting is discarded.

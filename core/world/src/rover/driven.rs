@@ -16,7 +16,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 
-use sightline_geometry::camera::MastAngles;
+use sightline_geometry::camera::{CameraName, MastAngles};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::{POSITION_LIMIT_M, Pixel, Pose, PoseRecord, Vector3};
@@ -27,7 +27,7 @@ use sightline_track::cycle_stage::CycleStage;
 use sightline_track::target::Designation;
 
 use crate::ground::texture::mix;
-use crate::index::{PAUSE_S, Rigs, odometry_pair, simulated_stop};
+use crate::index::{PAUSE_S, Rigs, odometry_pair, seen_by_body, simulated_stop};
 use crate::rover::drive::{first_stop, in_scene};
 use crate::rover::mast_error;
 use crate::rover::odometry::Belief;
@@ -79,6 +79,9 @@ pub struct DrivenStop {
     /// The target at which the mast was pointed here; `None` before that.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mast_target: Option<Designation>,
+    /// The pair on the body that took over from the main one here; `None` where the main one looks for the target.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub handed_to: Option<CameraName>,
     /// Tilt of the rover by the accelerometers, deg; `None` where the estimated pose still has it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub measured_tilt_deg: Option<f64>,
@@ -111,6 +114,7 @@ impl DrivenStop {
             odometry: None,
             odometry_alone: false,
             mast_target: None,
+            handed_to: None,
             measured_tilt_deg: None,
             awaits: None,
         })
@@ -152,6 +156,7 @@ impl DrivenStop {
                 odometry: None,
                 odometry_alone: false,
                 mast_target: None,
+                handed_to: None,
                 measured_tilt_deg: None,
                 awaits: None,
             })
@@ -174,6 +179,7 @@ impl DrivenStop {
             odometry: None,
             odometry_alone: false,
             mast_target: None,
+            handed_to: None,
             awaits: None,
             ..self.clone()
         }
@@ -278,6 +284,10 @@ pub fn index_stops(driven: &[DrivenStop], scenario: &Scenario) -> Vec<Stop> {
         let poses = [stop.true_site_from_rover, stop.site_from_rover].map(PoseRecord::to_pose);
         let metered_px = stop.metered_px;
         let made = simulated_stop(number, stop.time_s, poses, stop.mast_angles, with_error(number), &rigs);
+        let made = match stop.handed_to {
+            Some(name) => seen_by_body(made, number, name, &rigs),
+            None => made,
+        };
         let mut cameras = made.cameras;
         cameras.extend(stop.odometry_look.map(|told| {
             let pointed = mast_error::true_angles_of_look(told, scenario, number);

@@ -19,6 +19,8 @@ pub enum Arrangement {
     Face,
     /// The middle of what is seen of the rock on which the targets' centre lies.
     Centre,
+    /// The middle of what is seen of each rock that the scenario places, in their order (R209).
+    Placed,
 }
 
 /// The rule that chooses targets; `sim/targets` states it in full.

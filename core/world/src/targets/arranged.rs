@@ -9,7 +9,8 @@
 //! stretch, in whole pixels, so that in a true track both rows stay straight and even.
 //!
 //! **Centre.** Of all pixels that show the rock on which the targets' centre lies, the one nearest to their mean. The centre
-//! itself lies on top of the rock, and from afar that is the rock's upper edge, where nobody would pick a target (R20).
+//! itself lies on top of the rock, and from afar that is the rock's upper edge, where nobody would pick a target (R20). **Placed**
+//! is the same for each placed rock.
 //!
 //! Units: px. Frame: pixels of the first left image. Sources: papers.md R110, R115, R119.
 
@@ -19,15 +20,19 @@ use std::ops::RangeInclusive;
 use nalgebra::Vector3;
 use rand_pcg::Pcg64;
 
+use crate::scenario::PlacedRock;
 use crate::targets::view::View;
 use crate::world::SurfaceId;
-use sightline_geometry::frames::{Pixel, Ray};
+use sightline_geometry::frames::{Pixel, Point3, Ray};
 
 /// Distance of the grid on which pixels are counted, px.
 const STRIDE_PX: u32 = 3;
 
 /// How far the rock on which the targets' centre lies may be seen from it: it is cut by the edge there, px.
 const EDGE_PX: i32 = 16;
+
+/// A place from which every rock near the targets' centre is below, above it, m.
+const HIGH_M: f64 = 10.0;
 
 /// A stretch of an image row whose pixels satisfy the window rule.
 struct Stretch {
@@ -76,15 +81,31 @@ impl View<'_> {
 
     /// The target of the arrangement `centre`; the targets' centre where it does not lie on a rock, or none is seen of it.
     pub(super) fn centre(&self) -> Option<Pixel> {
-        let above = self.world.targets_centre() - Vector3::z();
-        let below = self.world.cast(&Ray { origin: above, direction: Vector3::z() });
-        let centre = self.camera.project(&self.world.targets_centre())?;
-        let Some(SurfaceId::Rock(rock)) = below.map(|hit| hit.surface) else { return Some(centre) };
+        let centre = self.world.targets_centre();
+        self.middle_of_rock_at([centre.x, centre.y]).or_else(|| self.camera.project(&centre))
+    }
+
+    /// The targets of the arrangement `placed`: the middle of what is seen of each rock that the scenario places, in their order,
+    /// where it is in the image.
+    pub(super) fn on_placed(&self) -> Vec<Pixel> {
+        let centre = self.world.targets_centre();
+        let middle = |rock: &PlacedRock| self.middle_of_rock_at([centre.x + rock.x_m, centre.y + rock.y_m]);
+        let [width, height] = self.camera.size;
+        let middles = self.placed.iter().filter_map(middle);
+        middles.filter(|pixel| pixel.is_inside(width, height)).take(self.rule.count as usize).collect()
+    }
+
+    /// The middle of what is seen of the rock at a place, x and y of the site, m; `None` without a rock, or where none is seen of it.
+    fn middle_of_rock_at(&self, [x, y]: [f64; 2]) -> Option<Pixel> {
+        let above = Point3::new(x, y, self.world.targets_centre().z) - HIGH_M * Vector3::z();
+        let below = self.world.cast(&Ray { origin: above, direction: Vector3::z() })?;
+        let SurfaceId::Rock(rock) = below.surface else { return None };
+        let centre = self.camera.project(&below.point)?;
         let seen = self.seen_of(rock, [centre.x.round() as i32, centre.y.round() as i32]);
         let mean = |k: usize| seen.iter().map(|at| f64::from(at[k])).sum::<f64>() / seen.len() as f64;
         let middle = Pixel::new(mean(0), mean(1));
         let pixels = seen.iter().map(|at| Pixel::new(at[0].into(), at[1].into()));
-        pixels.min_by(|a, b| a.distance(middle).total_cmp(&b.distance(middle))).or(Some(centre))
+        pixels.min_by(|a, b| a.distance(middle).total_cmp(&b.distance(middle)))
     }
 
     /// The pixels that show a rock and hang together, from the one nearest to `near` on, which is at most

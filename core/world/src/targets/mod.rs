@@ -8,6 +8,7 @@
 //! * `rows`: on the large rock, in `rows` straight rows of equal spacing (R110; `arranged.rs`).
 //! * `face`: on the large rock, `boundary` of them on an occluding boundary with another rock behind (R119).
 //! * `centre`: the middle of what is seen of the rock on which the targets' centre lies (`arranged.rs`).
+//! * `placed`: the same for each rock that the scenario places, in their order (R207, R209).
 //!
 //! The *large rock* is the one that most pixels near the targets' centre show.
 //!
@@ -49,6 +50,7 @@ pub fn choose_targets(world: &World, scenario: &Scenario, index: &TraverseIndex)
         Arrangement::Drawn => view.drawn(scenario.targets.count, &mut random, &|pixel| view.is_target(pixel)),
         Arrangement::Rows => view.rows(),
         Arrangement::Face => view.face(&mut random),
+        Arrangement::Placed => view.on_placed(),
         Arrangement::Centre => view.centre().into_iter().collect(),
     }
 }

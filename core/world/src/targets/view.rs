@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 use crate::camera::picture::Eye;
 use crate::index::true_camera_in_site;
 use crate::moment::Moment;
-use crate::scenario::{Scenario, TargetRule};
+use crate::scenario::{PlacedRock, Scenario, TargetRule};
 use crate::traverse::TraverseIndex;
 use crate::world::World;
 use sightline_geometry::camera::Camera;
@@ -21,6 +21,8 @@ pub(super) struct View<'a> {
     pub(super) camera: Camera,
     pub(super) last: [Camera; 2],
     pub(super) rule: &'a TargetRule,
+    /// Rocks that the scenario places.
+    pub(super) placed: &'a [PlacedRock],
 }
 
 /// The surface point under a pixel of a camera in the site: the truth of a target.
@@ -36,6 +38,7 @@ impl<'a> View<'a> {
             camera: true_camera_in_site(first, Eye::Left)?,
             last: [true_camera_in_site(last, Eye::Left)?, true_camera_in_site(last, Eye::Right)?],
             rule: &scenario.targets,
+            placed: &scenario.rocks.placed,
         })
     }
 

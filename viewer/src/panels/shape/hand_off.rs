@@ -1,9 +1,10 @@
 //! The hand-off: the last image of the old cameras, draped over its surface as the new camera would see it, beside where
 //! it was found (R205).
 
-use egui::{Grid, Ui};
+use egui::{Grid, Label, Ui};
 use sightline_api::wire::StopView;
 use sightline_track::locate::shape_tracker::drape::Draped;
+use sightline_track::locate::shape_tracker::placement::{Placement, REACH_M};
 use sightline_track::trace::ArrayName;
 
 use crate::drawing::overlay::Mark;
@@ -19,6 +20,9 @@ const PURPOSE: &str =
 /// Shows the part.
 pub(crate) fn show(ui: &mut Ui, look: &Look<'_>) {
     let found = look.evidence.registration.as_ref();
+    if let Some(placement) = &look.evidence.placement {
+        ui.add(Label::new(theme::note(placed(placement))).wrap());
+    }
     let Some(draped) = found.and_then(|found| found.draped.as_ref()) else {
         panels::missing(ui, PURPOSE, &why_none(look));
         return;
@@ -62,6 +66,29 @@ fn numbers(ui: &mut Ui, look: &Look<'_>, draped: &Draped) {
             ui.end_row();
         }
     });
+}
+
+/// What the arm is told, in a sentence.
+fn placed(placement: &Placement) -> String {
+    let [near, far] = REACH_M.map(|metres| format!("{metres:.1}"));
+    let reach = if placement.is_reachable {
+        format!("The arm reaches the target: {:.2} m from its shoulder.", placement.reach_m)
+    } else {
+        format!(
+            "The arm does not reach the target: {:.2} m from its shoulder, {near} to {far} m ahead can be reached; choose a smaller standoff.",
+            placement.reach_m
+        )
+    };
+    let touch = placement.offset_m.map_or_else(
+        || "No point within 15 cm of it can be touched without a collision.".to_owned(),
+        |offset_m| {
+            format!(
+                "The nearest point that can be touched without a collision is {:.1} cm from it.",
+                100.0 * offset_m
+            )
+        },
+    );
+    format!("{reach} {touch}")
 }
 
 /// Why there is no picture at this step.

@@ -263,11 +263,12 @@ fn locate(
     let is_sure = base.position_in_rover.is_some() && base.confidence >= least_confidence(input);
     evidence.is_judged_by_shape = by_shape.is_some() || evidence.registration.is_some() && !is_sure;
     let located = match by_shape {
-        Some(found) => {
+        Some((found, turn)) => {
             if let Some(features) = evidence.features.as_mut() {
-                let now_from_first = features.carried.map(|carried| carried.now_from_first);
-                let renewed = found.position_in_rover.zip(found.covariance_in_rover).zip(now_from_first);
-                features.carried = renewed.map(|((position, covariance), now_from_first)| Carried {
+                // Features that had lost the target are measured from here again.
+                let now_from_first = features.carried.map_or(turn, |carried| carried.now_from_first);
+                let renewed = found.position_in_rover.zip(found.covariance_in_rover);
+                features.carried = renewed.map(|(position, covariance)| Carried {
                     now_from_first,
                     ..Carried::designated(position, covariance)
                 });

@@ -4,7 +4,10 @@
 //! |---|---|---|---|
 //! | features that are sure | theirs | turned as their motions say | their covariance, 0.2° |
 //! | dead reckoning | the prediction | by the pose estimates | its covariance and half the basin, `shape_attitude_deg` |
-//! | a hand-off: the rover stands still | the target's | by the pose estimates | `hand_off_shift_m`, `hand_off_turn_deg` |
+//! | a hand-off, registered to the stop before | the target's | by the pose estimates | `hand_off_shift_m`, `hand_off_turn_deg` |
+//! | a hand-off of a tracked target, registered to the first view | the target's | by the pose estimates | what its covariance has beyond that view's, and `hand_off_shift_m`; `shape_attitude_deg` |
+//!
+//! At a hand-off the rover stands still. The surface of the stop before is there where that stop was registered itself.
 //!
 //! Source: R189, R197, R205; what is known of the start is ours.
 
@@ -28,13 +31,14 @@ use sightline_vision::registration::{
 /// Attitude since the designation as the features carry it, 1σ about each axis, deg: several times what they err by.
 const FEATURES_ATTITUDE_DEG: f64 = 0.2;
 
-/// The target by registration; none where that is not to be used, and why is in the evidence.
+/// The target by registration, and how the rover frame turned since the view; none where that is not to be used, and why is in
+/// the evidence.
 pub(super) fn by_shape(
     input: &LocateInput<'_>,
     views: &Views,
     base: &Sighting<ShapeEvidence>,
     evidence: &mut ShapeEvidence,
-) -> Option<Sighting<ShapeEvidence>> {
+) -> Option<(Sighting<ShapeEvidence>, UnitQuaternion<f64>)> {
     // A target that the stop before did not find may be anywhere: it is looked for by its first view, like any lost one.
     let is_of_the_stop_before = views.last.as_ref().is_some_and(|last| last.step + 1 == input.place.step);
     let is_hand_off = input.place.is_hand_over && is_of_the_stop_before;
@@ -60,8 +64,13 @@ pub(super) fn by_shape(
     if let Some(target) = &target {
         registered.correction_m = Some((target.position - tried.expected).norm());
         registered.ray = target.ray;
+        // The rover stands as at the view of the stop before, whose surface is the finer one.
         let there = found.fixed_from_moving * target.position;
-        evidence.placement = is_hand_off.then(|| placement(&view.mesh, &there));
+        evidence.placement = match is_hand_off {
+            true => Some(placement(&view.mesh, &there)),
+            false if input.place.is_hand_over => Some(placement(&tried.mesh, &target.position)),
+            false => None,
+        };
     }
     evidence.registration = Some(registered);
     let arrays = evidence.arrays.get_or_default();
@@ -80,14 +89,15 @@ pub(super) fn by_shape(
         image: Arc::clone(&input.capture.pair.left),
     }));
     let target = target?;
-    Some(Sighting {
+    let sighting = Sighting {
         left_pixel: left.project(&target.position),
         right_pixel: right.project(&target.position),
         position_in_rover: Some(target.position),
         covariance_in_rover: Some(target.covariance),
         confidence: overlap.map_or(0.0, |agreement| agreement.overlap),
         ..Sighting::default()
-    })
+    };
+    Some((sighting, found.fixed_from_moving.rotation.inverse()))
 }
 
 /// A registration with an earlier view, whether it is to be used or not.
@@ -171,6 +181,14 @@ impl Start {
             let prior = Prior { target_m2, attitude_rad: settings.hand_off_turn_deg.to_radians() };
             return Self { position: prediction.position_in_rover, fixed_from_moving: by_poses, prior };
         }
+        let is_tracked = input.place.is_hand_over && input.was_found;
+        let by_prediction = match is_tracked {
+            true => {
+                let added = added_since(view, &by_poses, &prediction.covariance_in_rover);
+                added + Matrix3::identity() * settings.hand_off_shift_m.powi(2)
+            }
+            false => prediction.covariance_in_rover + Matrix3::identity() * basin_m2,
+        };
         let by_features = base.position_in_rover.zip(base.covariance_in_rover);
         let carried = features.and_then(|features| features.carried);
         match by_features.zip(carried).filter(|_| base.confidence >= least_confidence(input)) {
@@ -183,12 +201,25 @@ impl Start {
                 position: prediction.position_in_rover,
                 fixed_from_moving: by_poses,
                 prior: Prior {
-                    target_m2: prediction.covariance_in_rover + Matrix3::identity() * basin_m2,
+                    target_m2: by_prediction,
                     attitude_rad: settings.shape_attitude_deg.to_radians(),
                 },
             },
         }
     }
+}
+
+/// The covariance that a target has beyond that of its view, m²: both have the error of the designation in common.
+fn added_since(
+    view: &View,
+    fixed_from_moving: &UnitQuaternion<f64>,
+    covariance_in_rover: &Matrix3<f64>,
+) -> Matrix3<f64> {
+    let turn = fixed_from_moving.inverse().to_rotation_matrix();
+    let common = turn * view.covariance_in_rover * turn.transpose();
+    let added = (covariance_in_rover - common).symmetric_eigen();
+    let axes = added.eigenvectors;
+    axes * Matrix3::from_diagonal(&added.eigenvalues.map(|variance| variance.max(0.0))) * axes.transpose()
 }
 
 /// Whether a picture may decide: the surfaces fit, though they may let the target slide.

@@ -3,16 +3,20 @@
 use rayon::prelude::*;
 
 use sightline_geometry::frames::{Point3, Pose, Ray, Vector3};
-use sightline_rover::driving::Motion;
+use sightline_recordings::DrivenTraverse;
+use sightline_rover::driving::set_goal::goal_position_m;
+use sightline_rover::driving::{DriveCommand, Motion};
 use sightline_rover::hazards::{GoodnessMap, HazardSettings, MapRules, Scan, assess, map_hazards};
 use sightline_rover::navigation::{NavigatorSettings, way};
+use sightline_track::target::Designation;
 use sightline_world::World;
+use sightline_world::target_truth::{TargetTruth, TruthSource};
 
 /// Distance of the points of the true map, m.
 const GROUND_STEP_M: f64 = 0.05;
 
 /// Length of a way over the true ground from a pose to a goal, site frame, m; `None` if the search finds none.
-pub(crate) fn true_way_m(
+pub fn true_way_m(
     world: &World,
     start: &Pose,
     goal_m: [f64; 2],
@@ -20,6 +24,21 @@ pub(crate) fn true_way_m(
 ) -> Option<f64> {
     let map = true_map(world, start, goal_m, hazards);
     way(&map, start, goal_m, navigator).map(|motions| motions.iter().map(length_m).sum())
+}
+
+/// The length of a way over the true ground of a world that the rover has not been driven in yet, from the first stop to the goal that
+/// follows from the true target, m; `None` without a way, or where no surface is at the target's pixel.
+pub fn way_to_goal_m(
+    begun: &DrivenTraverse,
+    command: &DriveCommand,
+    designation: Designation,
+    settings: (&HazardSettings, &NavigatorSettings),
+) -> Option<f64> {
+    let traverse = begun.traverse();
+    let target = TargetTruth::new(traverse, designation, None)?.position_in_site();
+    let start = TruthSource::true_site_from_rover(traverse, 0)?;
+    let goal_m = goal_position_m(command, &target, [start.translation.x, start.translation.y]);
+    true_way_m(traverse.world()?, &start, goal_m, settings)
 }
 
 fn length_m(motion: &Motion) -> f64 {
@@ -45,6 +64,8 @@ fn true_map(world: &World, start: &Pose, goal_m: [f64; 2], settings: &HazardSett
             Some(middle.inverse_transform_point(&hit.point))
         })
         .collect();
+    // Every point was met from above: none is on a face.
+    let settings = &HazardSettings { face_spread_m: f64::INFINITY, ..settings.clone() };
     let scan = Scan { points_in_rover: &points, site_from_rover: &middle, driven_m: 0.0, noise: None };
     assess(&map_hazards(None, &scan, settings), &MapRules::default(), settings)
 }

@@ -1,0 +1,122 @@
+//! K9's three targets in one drive on commands: visited in turn with hazard avoidance, each handed over to the hazcams.
+//!
+//! ```text
+//! tracker    │ x_mast − x_true │           at the last stop of the mast's pair
+//! hand-off   │ x_handed − x_mast │         what the transfer to the hazcams added: the rover stands still
+//! ```
+//! All in the rover frame, m. *Tracker accuracy* and *hand-off accuracy* are the paper's words (R213), measured against the truth.
+//!
+//! Source: D§4, R205–R215.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use sightline_geometry::cancel::Cancel;
+use sightline_geometry::error::{Error, Result};
+use sightline_recordings::DrivenTraverse;
+use sightline_rover::driving::{ArrivalAction, DriveCommand, NavigatorKind};
+use sightline_session::step::RunStep;
+use sightline_session::targeted_drive::TargetedDrive;
+use sightline_track::presets::preset;
+use sightline_track::target::Designation;
+use sightline_world::{Scenario, choose_targets, library};
+
+use super::checkouts::Images;
+
+/// The scenarios: a day with the sun aside, and one with the rover's own shadow (R214).
+pub const DAYS: [&str; 2] = ["k9-day", "k9-day-shadow"];
+
+/// The part of the drive to one target.
+#[derive(Clone, Debug, Serialize)]
+pub struct K9Visit {
+    /// The scenario.
+    pub day: &'static str,
+    /// The world's seed.
+    pub seed: u64,
+    /// The target, 0 to 2.
+    pub target: usize,
+    /// How it ended.
+    pub reason: String,
+    /// Stops of this part.
+    pub stops: usize,
+    /// Stops of this part at which the update was bad or the target lost.
+    pub bad_stops: usize,
+    /// Error at the last stop of the mast's pair, m; null if the target was not visited.
+    pub tracker_m: Option<f64>,
+    /// What the hand-off added, m; null where there was none.
+    pub hand_off_m: Option<f64>,
+    /// Error after the hand-off, m.
+    pub handed_m: Option<f64>,
+    /// Why the hand-off was not used; null where it was.
+    pub failure: Option<String>,
+    /// Distance of the point that the arm would touch from the target, m.
+    pub touch_m: Option<f64>,
+    /// Time on Mars up to its end, min.
+    pub minutes: f64,
+}
+
+/// Drives a day and returns its three visits, those that were not reached left out.
+///
+/// # Errors
+/// A world that does not show all three targets, or cannot be driven in, or [`Error::Cancelled`].
+pub fn drive(day: &'static str, images: Images, folder: &Path, cancel: Cancel<'_>) -> Result<Vec<K9Visit>> {
+    let mut scenario = Scenario { seed: images.seed, ..library::scenario(day)? };
+    scenario.camera.image_size = images.size;
+    scenario.camera.samples_per_axis = images.samples_per_axis;
+    scenario.validate()?;
+    let settings = preset("combined")?.settings()?;
+    let world = DrivenTraverse::begin(&scenario, folder, cancel)?;
+    let traverse = world.traverse();
+    let targets = traverse.world().map(|world| choose_targets(world, &scenario, traverse.index()));
+    let targets: Vec<Designation> =
+        targets.unwrap_or_default().into_iter().map(|pixel| Designation::new(0, pixel)).collect();
+    if targets.len() < 3 {
+        return Err(Error::Target(format!("the first image shows {} of the three rocks", targets.len())));
+    }
+    let command = DriveCommand {
+        navigator: NavigatorKind::Morphin,
+        on_arrival: vec![ArrivalAction::HandOff],
+        // The times of a Mars rover are not those of K9.
+        flight_minutes_max: 10_000.0,
+        ..DriveCommand::default()
+    };
+    let mut drive = TargetedDrive::begin_to(world, &targets, command, &settings, cancel)?;
+    let mut visits = Vec::new();
+    loop {
+        while drive.advance(&settings, cancel)? {}
+        visits.push(visit(day, images.seed, &drive));
+        if !drive.visit_next() {
+            return Ok(visits);
+        }
+    }
+}
+
+fn visit(day: &'static str, seed: u64, drive: &TargetedDrive) -> K9Visit {
+    let since = drive.command.since.unwrap_or(0);
+    let own: Vec<&RunStep> =
+        drive.steps.iter().filter(|step| step.step >= since).map(AsRef::as_ref).collect();
+    let handed = own.last().filter(|last| last.shape().is_some_and(|shape| shape.registration.is_some()));
+    let handed = handed.filter(|_| drive.cycles.last().is_some_and(|cycle| cycle.arrival_actions > 0));
+    let mast = if handed.is_some() { own.len().checked_sub(2) } else { own.len().checked_sub(1) };
+    let mast = mast.and_then(|index| own.get(index));
+    let error_m = |step: &&RunStep| step.truth.as_ref().map(|truth| truth.err_m);
+    let position = |step: &&RunStep| step.update.target.position_in_rover;
+    let failure = handed.and_then(|step| step.shape()?.registration.as_ref()?.reason.clone());
+    let is_used = failure.is_none();
+    let is_bad = |step: &&&RunStep| step.verdict().is_some_and(|verdict| !verdict.accepted);
+    K9Visit {
+        day,
+        seed,
+        target: drive.target,
+        reason: drive.ending().map_or_else(String::new, |ending| ending.reason.word().to_owned()),
+        stops: own.len(),
+        bad_stops: own.iter().filter(is_bad).count(),
+        tracker_m: mast.and_then(error_m),
+        hand_off_m: handed.zip(mast).filter(|_| is_used).map(|(a, b)| (position(a) - position(b)).norm()),
+        handed_m: handed.filter(|_| is_used).and_then(error_m),
+        failure,
+        touch_m: handed.and_then(|step| step.shape()?.placement?.offset_m),
+        minutes: drive.cycles.last().map_or(0.0, |cycle| cycle.flight_minutes),
+    }
+}
