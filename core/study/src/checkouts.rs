@@ -159,7 +159,11 @@ pub fn drive(
         3 => DriveCommand { motions: motions[..7].to_vec(), ..blind.clone() },
         _ => DriveCommand {
             standoff_m: standoff_m(traverse, scenario.drive.end_distance_m),
-            on_arrival: if number == 4 { vec![ArrivalAction::HandOff] } else { Vec::new() },
+            on_arrival: if number == 4 {
+                vec![ArrivalAction::Look, ArrivalAction::HandOff]
+            } else {
+                Vec::new()
+            },
             ..blind.clone()
         },
     };

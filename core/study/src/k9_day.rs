@@ -1,8 +1,9 @@
 //! K9's three targets in one drive on commands: visited in turn with hazard avoidance, each handed over to the hazcams.
 //!
 //! ```text
-//! tracker    │ x_mast − x_true │           at the last stop of the mast's pair
-//! hand-off   │ x_handed − x_mast │         what the transfer to the hazcams added: the rover stands still
+//! tracker      │ x_arrived − x_true │     by features, at the stop at which the rover arrives
+//! first view   │ x_look − x_true │        after the registration of the next pair to the view of the designation
+//! hand-off     │ x_handed − x_look │      what the transfer to the hazcams added: the rover stands still
 //! ```
 //! All in the rover frame, m. *Tracker accuracy* and *hand-off accuracy* are the paper's words (R213), measured against the truth.
 //!
@@ -42,8 +43,10 @@ pub struct K9Visit {
     pub stops: usize,
     /// Stops of this part at which the update was bad or the target lost.
     pub bad_stops: usize,
-    /// Error at the last stop of the mast's pair, m; null if the target was not visited.
+    /// Error at the stop at which it arrived, or else at the last, m.
     pub tracker_m: Option<f64>,
+    /// Error of the registration to the first view, m; null if it did not arrive.
+    pub first_view_m: Option<f64>,
     /// What the hand-off added, m; null where there was none.
     pub hand_off_m: Option<f64>,
     /// Error after the hand-off, m.
@@ -76,7 +79,7 @@ pub fn drive(day: &'static str, images: Images, folder: &Path, cancel: Cancel<'_
     }
     let command = DriveCommand {
         navigator: NavigatorKind::Morphin,
-        on_arrival: vec![ArrivalAction::HandOff],
+        on_arrival: vec![ArrivalAction::Look, ArrivalAction::HandOff],
         // The times of a Mars rover are not those of K9.
         flight_minutes_max: 10_000.0,
         ..DriveCommand::default()
@@ -96,10 +99,9 @@ fn visit(day: &'static str, seed: u64, drive: &TargetedDrive) -> K9Visit {
     let since = drive.command.since.unwrap_or(0);
     let own: Vec<&RunStep> =
         drive.steps.iter().filter(|step| step.step >= since).map(AsRef::as_ref).collect();
-    let handed = own.last().filter(|last| last.shape().is_some_and(|shape| shape.registration.is_some()));
-    let handed = handed.filter(|_| drive.cycles.last().is_some_and(|cycle| cycle.arrival_actions > 0));
-    let mast = if handed.is_some() { own.len().checked_sub(2) } else { own.len().checked_sub(1) };
-    let mast = mast.and_then(|index| own.get(index));
+    let actions = drive.cycles.last().map_or(0, |cycle| cycle.arrival_actions as usize);
+    let at = |back: usize| own.len().checked_sub(1 + back).and_then(|index| own.get(index));
+    let [handed, look] = [0, 1].map(|back| at(back).filter(|_| actions == 2));
     let error_m = |step: &&RunStep| step.truth.as_ref().map(|truth| truth.err_m);
     let position = |step: &&RunStep| step.update.target.position_in_rover;
     let failure = handed.and_then(|step| step.shape()?.registration.as_ref()?.reason.clone());
@@ -112,8 +114,9 @@ fn visit(day: &'static str, seed: u64, drive: &TargetedDrive) -> K9Visit {
         reason: drive.ending().map_or_else(String::new, |ending| ending.reason.word().to_owned()),
         stops: own.len(),
         bad_stops: own.iter().filter(is_bad).count(),
-        tracker_m: mast.and_then(error_m),
-        hand_off_m: handed.zip(mast).filter(|_| is_used).map(|(a, b)| (position(a) - position(b)).norm()),
+        tracker_m: at(actions).and_then(error_m),
+        first_view_m: look.and_then(error_m),
+        hand_off_m: handed.zip(look).filter(|_| is_used).map(|(a, b)| (position(a) - position(b)).norm()),
         handed_m: handed.filter(|_| is_used).and_then(error_m),
         failure,
         touch_m: handed.and_then(|step| step.shape()?.placement?.offset_m),

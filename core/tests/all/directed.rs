@@ -96,7 +96,8 @@ fn a_target_is_handed_over_to_the_hazcams_and_registered_to_the_first_view() {
         assert_eq!(summary.reason, Some(StopReason::Arrived));
         // Without a look the last surface is that of the designation.
         assert_eq!(found.to_step, if looks == 0 { 0 } else { mast.step });
-        assert!(found.failure.is_none() && summary.target_error_m.unwrap() < 0.01);
+        // The surface of the designation, 5 m away, is the coarser one.
+        assert!(found.failure.is_none() && summary.target_error_m.unwrap() < 0.02 / (1.0 + looks as f64));
         let placement = handed.shape().unwrap().placement.expect("the arm is told");
         // The standoff of 2 m is beyond the arm.
         assert!(!placement.is_reachable && placement.offset_m.is_some(), "{placement:?}");

@@ -3,6 +3,7 @@
 pub(crate) mod faults;
 pub(crate) mod hazards;
 pub(crate) mod map;
+mod motions;
 pub(crate) mod panel;
 pub(crate) mod paths;
 pub(crate) mod pause;

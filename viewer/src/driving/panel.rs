@@ -10,7 +10,7 @@ use sightline_session::pause::PauseSide;
 use sightline_track::cycle_stage::CycleStage;
 
 use crate::command::{Command, Go};
-use crate::driving::{Ask, faults, pause, visits, why, words};
+use crate::driving::{Ask, faults, motions, pause, visits, why, words};
 use crate::panels::digits;
 use crate::panels::panel::Panel;
 use crate::state::{State, run_letter};
@@ -134,10 +134,15 @@ fn limits(ui: &mut Ui, command: &mut DriveCommand) {
             "Locates the target in the pair of hazcams, near the arm, after the looks. The configuration combined registers the \
              surface there; it needs hazcams at every stop.",
         );
+        if hands_off && !before.1 {
+            // The surface of a look is registered best.
+            looks = looks.max(1);
+        }
         if (looks, hands_off) != before {
             command.on_arrival = vec![ArrivalAction::Look; looks];
             command.on_arrival.extend(hands_off.then_some(ArrivalAction::HandOff));
         }
+        motions::field(ui, command);
         let presets = [OdometryPreset::Sightline, OdometryPreset::Mer2007];
         let pairs = [OdometryPair::Shared, OdometryPair::Own];
         let stops = [TrackedStops::Every, TrackedStops::ByDistance];

@@ -95,18 +95,14 @@ impl HazardMap {
         &self.cells[self.grid.slot(row, column)]
     }
 
-    /// z of a cell as an obstacle, from the reference, m: its mean, or, for points that spread along z more than those of ground
-    /// do, as on the face of a rock, the face's upper edge; not finite without points. See `steps.rs`.
-    pub(super) fn obstacle_height_m(&self, row: usize, column: usize, face_spread_m: f64) -> f64 {
+    /// z of the upper edge of a cell whose points spread along z more than those of ground do, as on the face of a rock, from the
+    /// reference, m; `None` for other cells. See `steps.rs`.
+    pub(super) fn upper_edge_m(&self, row: usize, column: usize, face_spread_m: f64) -> Option<f64> {
         let slot = self.grid.slot(row, column);
         let cell = &self.cells[slot];
-        let (mean_m, spread_m) = (cell.mean_height_m(), cell.spread_m());
+        let spread_m = Some(cell.spread_m()).filter(|spread_m| *spread_m > face_spread_m)?;
         // z is down.
-        if spread_m > face_spread_m {
-            (mean_m - 3f64.sqrt() * spread_m).max(self.highest_m[slot])
-        } else {
-            mean_m
-        }
+        Some((cell.mean_height_m() - 3f64.sqrt() * spread_m).max(self.highest_m[slot]))
     }
 
     /// The map in another window, after a distance.

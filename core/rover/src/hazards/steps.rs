@@ -3,10 +3,13 @@
 //! ```text
 //! step(p) = max (|h(c) − h(c + o)| − k √(σ²(c) + σ²(c + o)))      c ∈ D_p ∩ (D_p − o),  0 < |o| ≤ reach
 //! s²(c)   = Σz²/n − z̄² − σ²(c)
-//! h(c)    = max(z̄(c) − √3 s(c), z_top(c)) where s(c) > face_spread_m, else z̄(c)
+//! edge(c) = max(z̄(c) − √3 s(c), z_top(c))
+//! h(c)    = edge(c) where s(c) > face_spread_m and no cell beside c is as high within face_spread_m, else z̄(c)
 //! ```
 //! A camera near the ground sees the face of a rock, and little of its top. The points of a face spread evenly from its foot to
 //! its upper edge: by s = H/√12 for a height H, and z̄ is half way up (z down). No point is above that edge, z_top.
+//! Where a cell beside it shows the top, the step to that cell is found anyway, and cells that are partly top and partly ground keep
+//! their mean.
 //!
 //! For each offset o the differences form one image, and the maximum over the intersection of both discs is taken row by
 //! row: a run of l cells is covered by two runs of 2^k ≤ l, whose maxima are computed once for the whole image.
@@ -29,15 +32,7 @@ use super::settings::HazardSettings;
 /// The largest step in the disc around every cell, row by row, m; 0 where no two cells are known.
 pub(super) fn steps(map: &HazardMap, disc: &Disc, reach: &Disc, settings: &HazardSettings) -> Vec<f32> {
     let side = map.grid.side;
-    let heights: Vec<f32> = (0..side * side)
-        .map(|index| {
-            let (row, column) = (index / side, index % side);
-            if map.cell(row, column).count() < settings.weight_min {
-                return f32::NAN;
-            }
-            map.obstacle_height_m(row, column, settings.face_spread_m) as f32
-        })
-        .collect();
+    let heights = heights(map, settings);
     let k2 = settings.step_sigmas.powi(2);
     let variances: Vec<f32> = (0..side * side)
         .map(|index| (k2 * map.cell(index / side, index % side).variance_m2()) as f32)
@@ -57,6 +52,30 @@ pub(super) fn steps(map: &HazardMap, disc: &Disc, reach: &Disc, settings: &Hazar
     };
     let nothing = || vec![0.0; side * side];
     offsets.into_par_iter().map(|offset| largest(&cells, offset, disc)).reduce(nothing, larger)
+}
+
+/// The height of every cell, row by row, m, NaN where unknown.
+fn heights(map: &HazardMap, settings: &HazardSettings) -> Vec<f32> {
+    let side = map.grid.side;
+    let mean = |[row, column]: [usize; 2]| {
+        let cell = map.cell(row, column);
+        (cell.count() >= settings.weight_min).then(|| cell.mean_height_m())
+    };
+    let height = |at: [usize; 2]| {
+        let mean_m = mean(at)?;
+        let Some(edge_m) = map.upper_edge_m(at[0], at[1], settings.face_spread_m) else {
+            return Some(mean_m);
+        };
+        let around = |index: usize| index.saturating_sub(1)..(index + 2).min(side);
+        let mut near = around(at[0]).flat_map(|row| around(at[1]).map(move |column| [row, column]));
+        // z is down.
+        let has_top =
+            near.any(|other| mean(other).is_some_and(|top_m| top_m <= edge_m + settings.face_spread_m));
+        Some(if has_top { mean_m } else { edge_m })
+    };
+    (0..side * side)
+        .map(|index| height([index / side, index % side]).map_or(f32::NAN, |m| m as f32))
+        .collect()
 }
 
 /// Replaces every value by the larger one of the two.

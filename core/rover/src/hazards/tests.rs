@@ -110,8 +110,34 @@ fn a_chequered_surface_is_rough_but_level() {
 }
 
 #[test]
+fn a_face_is_as_high_as_its_upper_edge_whether_its_top_is_seen_or_not() {
+    let settings = HazardSettings::default();
+    let ground = (-150..150)
+        .flat_map(|row| (-150..150).map(move |column| (row, column)))
+        .map(|(row, column)| Point3::new(0.01 * f64::from(row), 0.01 * f64::from(column) + 0.005, 0.0));
+    let ground: Vec<Point3> = ground.filter(|point| point.x < 1.0).collect();
+    // A face of 0.3 m across the way at 1.05 m; behind it nothing is seen, or its top.
+    let face = (0..30).flat_map(|z| {
+        (-30..30).map(move |y| Point3::new(1.05, 0.01 * f64::from(y) + 0.005, -0.01 * f64::from(z) - 0.005))
+    });
+    let top = (0..20).flat_map(|x| {
+        (-30..30).map(move |y| Point3::new(1.105 + 0.01 * f64::from(x), 0.01 * f64::from(y) + 0.005, -0.3))
+    });
+    let (face, top): (Vec<Point3>, Vec<Point3>) = (face.collect(), top.collect());
+    for seen in [[&ground[..], &face[..], &[]].concat(), [&ground[..], &face[..], &top[..]].concat()] {
+        let map = mapped(None, &seen, &pose(0.0, 0.0), 0.0, &settings);
+        let assessed = assess(&map, &MapRules::default(), &settings);
+        let step_m = assessed.cell_at([0.65, 0.05]).unwrap().step_m;
+        assert!((step_m - 0.3).abs() < 0.02, "{step_m}");
+        // Level ground stays level.
+        assert!(assessed.cell_at([-0.5, 0.05]).unwrap().step_m < 1e-6);
+    }
+}
+
+#[test]
 fn sums_and_steps_are_those_of_a_visit_of_every_cell() {
-    let settings = HazardSettings { side_m: 5.0, weight_min: 1.0, ..HazardSettings::default() };
+    let settings =
+        HazardSettings { side_m: 5.0, weight_min: 1.0, face_spread_m: 2.0, ..HazardSettings::default() };
     let mut random = Pcg64::seed_from_u64(3);
     // Holes as well: about a third of the cells have no point.
     let scattered: Vec<Point3> = (0..3000)
