@@ -13,8 +13,8 @@ use super::{Found, StopCause, StoppedDrive};
 const RISEN_M: f32 = 0.1;
 /// Least number of risen cells at a stop: at the foot of a rock, which is seen better from near, up to nine rise.
 const RISEN_CELLS: usize = 10;
-/// At three of the last five stops.
-const LAST_STOPS: usize = 5;
+/// At three of the last twenty stops: a rover that turns in front of it does not raise it at every stop.
+const LAST_STOPS: usize = 20;
 const RISEN_STOPS: usize = 3;
 
 impl StoppedDrive<'_> {
