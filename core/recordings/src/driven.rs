@@ -337,8 +337,7 @@ impl ActiveWorld for DrivenTraverse {
     }
 
     fn hand_over(&mut self, to: CameraName) -> Result<()> {
-        let last = &self.driven[self.driven.len() - 1];
-        self.driven.push(DrivenStop { handed_to: Some(to), ..last.stay() });
+        self.driven.push(DrivenStop { handed_to: Some(to), ..self.driven[self.driven.len() - 1].stay() });
         self.put_last()
     }
 

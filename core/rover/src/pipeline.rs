@@ -28,7 +28,7 @@ use sightline_track::trace::{StepKind, StepTrace};
 
 use crate::begun::Begun;
 use crate::pair::{self, FurtherCamera, FurtherImages, StopPair};
-use crate::sight::{not_searched, pointing};
+use crate::sight::{has_stayed, not_searched, pointing};
 use crate::visual_odometry::{MeasuredMotion, pose_change_error};
 
 /// The stops of a drive, as the stages see them.
@@ -380,11 +380,6 @@ fn place(stops: &dyn Stops, step: usize, camera: Option<CameraName>, settings: &
         is_hand_over: step > 0 && changes(step - 1, step),
         is_last_of_pair: if is_driven { has_stayed(stops, step) } else { is_last || changes(step, step + 1) },
     }
-}
-
-/// Whether the rover stands where it stood at the stop before.
-pub(crate) fn has_stayed(stops: &dyn Stops, step: usize) -> bool {
-    step > 0 && stops.site_from_rover(step) == stops.site_from_rover(step - 1)
 }
 
 /// Whether two left cameras are the same one, however it points: equal image size and kind of model, focal lengths that

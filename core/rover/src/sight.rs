@@ -54,3 +54,8 @@ fn is_in_view(pair: &StopPair<'_>, point_in_rover: &Point3) -> bool {
         })
     })
 }
+
+/// Whether the rover stands where it stood at the stop before.
+pub(crate) fn has_stayed(stops: &dyn Stops, step: usize) -> bool {
+    step > 0 && stops.site_from_rover(step) == stops.site_from_rover(step - 1)
+}

@@ -236,7 +236,7 @@ impl DriveCommand {
     }
 
     /// Whether the rover drives given motions instead of those to a goal.
-    pub fn is_directed(&self) -> bool {
+    pub(crate) fn is_directed(&self) -> bool {
         !self.motions.is_empty()
     }
 

@@ -210,38 +210,48 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
         cycle.ending = ending(stops, input, &cycle);
         return cycle;
     }
-    let is_there = if input.command.is_directed() {
-        has_driven_all(input, &cycle)
-    } else {
-        goal.arrived && !input.last.is_odometry_alone()
-    };
-    let has_arrived = is_there || arrival_actions > 0;
-    let action = input.command.on_arrival.get(arrival_actions as usize).filter(|_| has_arrived);
-    if action.is_some() {
-        cycle.arrival_actions += 1;
-        cycle.action = action.copied();
+    begin_action(input, &mut cycle);
+    if cycle.action.is_some() {
         return cycle;
     }
     cycle.ending = ending(stops, input, &cycle);
-    if cycle.ending.is_some() {
-        return cycle;
+    if cycle.ending.is_none() {
+        choose_motion(stops, input, &mut cycle, &target_in_site);
     }
+    cycle
+}
+
+/// Begins the next action after arrival, if the rover has arrived and one is left.
+fn begin_action(input: &CycleInput<'_>, cycle: &mut Cycle) {
+    let is_there = if input.command.is_directed() {
+        has_driven_all(input, cycle)
+    } else {
+        cycle.goal.arrived && !input.last.is_odometry_alone()
+    };
+    let has_arrived = is_there || cycle.arrival_actions > 0;
+    cycle.action =
+        input.command.on_arrival.get(cycle.arrival_actions as usize).copied().filter(|_| has_arrived);
+    cycle.arrival_actions += u32::from(cycle.action.is_some());
+}
+
+/// Chooses the motion from a stop at which the drive goes on.
+fn choose_motion(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &mut Cycle, target_in_site: &Point3) {
     if let Some(motion) = input.command.motions.get(cycle.motions_begun as usize) {
         cycle.motion = Some(*motion);
         cycle.motions_begun += 1;
-        return cycle;
+        return;
     }
     // Where odometry alone brought the rover to the goal, it stays for the tracker.
-    if !goal.arrived {
-        let target_in_rover = pose.inverse_transform_point(&target_in_site);
-        let distance_m = (target_in_rover - left.model.centre()).norm();
-        next_motion::choose(stops, input, &mut cycle, distance_m);
+    if !cycle.goal.arrived {
+        let target_in_rover = stops.site_from_rover(cycle.step).inverse_transform_point(target_in_site);
+        let distance_m = (target_in_rover - stops.cameras(cycle.step).0.model.centre()).norm();
+        next_motion::choose(stops, input, cycle, distance_m);
         if cycle.choice.is_some() {
-            cycle.flight = time.with_hazards();
-            cycle.flight_minutes += (cycle.flight.total_s() - time.total_s()) / 60.0;
+            let before_s = cycle.flight.total_s();
+            cycle.flight = cycle.flight.with_hazards();
+            cycle.flight_minutes += (cycle.flight.total_s() - before_s) / 60.0;
         }
     }
-    cycle
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]

@@ -16,7 +16,8 @@ use sightline_geometry::frames::Pose;
 
 use super::active_world::ActiveWorld;
 use super::command::DriveCommand;
-use crate::pipeline::{Stops, has_stayed};
+use crate::pipeline::Stops;
+use crate::sight::has_stayed;
 use crate::visual_odometry::look::{is_back, look, look_back};
 use crate::visual_odometry::{MeasuredMotion, OdometryMode};
 

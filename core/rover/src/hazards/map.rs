@@ -17,6 +17,8 @@ use super::grid::Grid;
 use super::moments::{Moments, SUMS};
 use super::settings::HazardSettings;
 
+/// By so many 1σ of its points' heights a face must spread more than `face_spread_m`.
+const FACE_SIGMAS: f64 = 2.0;
 /// Sums below this number of points are forgotten.
 const FORGOTTEN: f64 = 1e-3;
 
@@ -100,7 +102,8 @@ impl HazardMap {
     pub(super) fn upper_edge_m(&self, row: usize, column: usize, face_spread_m: f64) -> Option<f64> {
         let slot = self.grid.slot(row, column);
         let cell = &self.cells[slot];
-        let spread_m = Some(cell.spread_m()).filter(|spread_m| *spread_m > face_spread_m)?;
+        let least_m = face_spread_m + FACE_SIGMAS * cell.variance_m2().sqrt();
+        let spread_m = Some(cell.spread_m()).filter(|spread_m| *spread_m > least_m)?;
         // z is down.
         Some((cell.mean_height_m() - 3f64.sqrt() * spread_m).max(self.highest_m[slot]))
     }

@@ -4,7 +4,7 @@
 //! step(p) = max (|h(c) − h(c + o)| − k √(σ²(c) + σ²(c + o)))      c ∈ D_p ∩ (D_p − o),  0 < |o| ≤ reach
 //! s²(c)   = Σz²/n − z̄² − σ²(c)
 //! edge(c) = max(z̄(c) − √3 s(c), z_top(c))
-//! h(c)    = edge(c) where s(c) > face_spread_m and no cell beside c is as high within face_spread_m, else z̄(c)
+//! h(c)    = edge(c) where s(c) > face_spread_m + 2 σ(c) and no cell beside c is as high within face_spread_m, else z̄(c)
 //! ```
 //! A camera near the ground sees the face of a rock, and little of its top. The points of a face spread evenly from its foot to
 //! its upper edge: by s = H/√12 for a height H, and z̄ is half way up (z down). No point is above that edge, z_top.

@@ -76,18 +76,7 @@ pub(super) fn by_shape(
     let arrays = evidence.arrays.get_or_default();
     arrays.add(found, [&view.mesh, &tried.mesh], &found.fixed_from_moving.inverse());
     let (overlap, left, right) = (found.agreement[2], &input.pointing.left, &input.pointing.right);
-    // Kept with the position that this stop ends with.
-    evidence.view = Some(Arc::new(View {
-        step: input.place.step,
-        site_from_rover: *input.site_from_rover,
-        position_in_rover: tried.expected,
-        covariance_in_rover: input.prediction.covariance_in_rover,
-        ray: None,
-        half_width_m: view.half_width_m,
-        mesh: tried.mesh,
-        left: left.clone(),
-        image: Arc::clone(&input.capture.pair.left),
-    }));
+    evidence.view = Some(Arc::new(present_view(input, view.half_width_m, (tried.expected, tried.mesh))));
     let target = target?;
     let sighting = Sighting {
         left_pixel: left.project(&target.position),
@@ -98,6 +87,21 @@ pub(super) fn by_shape(
         ..Sighting::default()
     };
     Some((sighting, found.fixed_from_moving.rotation.inverse()))
+}
+
+/// The view of this stop, kept with the position that the stop ends with.
+fn present_view(input: &LocateInput<'_>, half_width_m: f64, (expected, mesh): (Point3, Mesh)) -> View {
+    View {
+        step: input.place.step,
+        site_from_rover: *input.site_from_rover,
+        position_in_rover: expected,
+        covariance_in_rover: input.prediction.covariance_in_rover,
+        ray: None,
+        half_width_m,
+        mesh,
+        left: input.pointing.left.clone(),
+        image: Arc::clone(&input.capture.pair.left),
+    }
 }
 
 /// A registration with an earlier view, whether it is to be used or not.
