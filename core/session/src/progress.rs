@@ -40,7 +40,7 @@ pub enum Next {
     /// A drive to another stop, on the estimates of these steps.
     Drive {
         /// Who drives, and how.
-        steering: Steering,
+        steering: Box<Steering>,
         /// The run's steps so far; the last is that of the last stop.
         steps: Vec<Arc<RunStep>>,
     },
@@ -136,7 +136,7 @@ impl Session {
         let last = run.steps.last().filter(|last| !last.is_begun())?.step;
         let waits = steering.halt().is_some_and(|halt| last >= halt.stop) || run.stop_after.is_some();
         (last + 1 == self.stop_count && !waits)
-            .then(|| Next::Drive { steering: steering.clone(), steps: run.steps.clone() })
+            .then(|| Next::Drive { steering: Box::new(steering.clone()), steps: run.steps.clone() })
     }
 
     /// Lets a run drive under a command.
