@@ -39,6 +39,7 @@ use sightline_world::scenario::{CameraRig, FurtherRig, Move};
 use sightline_world::target_truth::TruthSource;
 use sightline_world::{Scenario, choose_targets, library};
 
+use super::paper::TABLE_III;
 use super::step_record::StepRecord;
 
 /// The images of the drives, and their world.
@@ -107,16 +108,6 @@ pub struct Checkout {
     pub placement: Option<Placement>,
 }
 
-/// Magnification, roll, azimuth and score of Table III (R133), positions 2 to 8.
-const TABLE_III: [[f64; 4]; 7] = [
-    [1.04, 2.46, 6.01, 0.88],
-    [1.03, 2.46, 6.38, 0.88],
-    [1.03, 2.92, 8.53, 0.85],
-    [1.01, 3.27, 8.58, 0.87],
-    [1.00, 3.27, 8.62, 0.87],
-    [0.97, 0.06, 0.00, 0.94],
-    [1.04, 6.25, 15.44, 0.79],
-];
 /// The turn of checkout 1, rad, and the straight motion after it, m (R131).
 const TURN_RAD: f64 = 20.0 * std::f64::consts::PI / 180.0;
 const STRAIGHT_M: f64 = 1.0;
@@ -288,8 +279,8 @@ impl Under<'_> {
 
     fn finish(mut self, number: u32) -> Result<Checkout> {
         if number == 1 {
-            for (step, paper) in self.steps.iter_mut().skip(1).zip(TABLE_III) {
-                step.paper = Some(paper);
+            for (row, step) in self.steps.iter_mut().skip(1).enumerate().take(7) {
+                step.paper = Some(TABLE_III.map(|(_, column)| column[row]));
             }
         }
         let last = self.drive.steps.last();
@@ -325,8 +316,8 @@ fn best_turn_centre(target_m: [f64; 2], camera_m: [f64; 2]) -> TurnCentre {
     let all = places.map(|centre_m| {
         let rows = rows_of_turn(centre_m, target_m, camera_m);
         let off = |row: usize| {
-            let paper = TABLE_III[5 + row];
-            ((rows[row][0] - paper[0]) / 0.04).powi(2) + (rows[row][1].abs() - paper[2]).powi(2)
+            let [magnification, _, azimuth_deg, _] = TABLE_III.map(|(_, column)| column[5 + row]);
+            ((rows[row][0] - magnification) / 0.04).powi(2) + (rows[row][1].abs() - azimuth_deg).powi(2)
         };
         TurnCentre { centre_m, rows, residual: (0.25 * (off(0) + off(1))).sqrt() }
     });

@@ -93,15 +93,17 @@ pub const TABLE_II: [PaperTerrain; 4] = [
     },
 ];
 
-/// Table III (R133), by position.
+/// Table III (R133): each column by position, from the second on.
+pub(crate) const TABLE_III: [(&str, [f64; 7]); 4] = [
+    ("magnification", [1.04, 1.03, 1.03, 1.01, 1.00, 0.97, 1.04]),
+    ("roll_deg", [2.46, 2.46, 2.92, 3.27, 3.27, 0.06, 6.25]),
+    ("azimuth_change_deg", [6.01, 6.38, 8.53, 8.58, 8.62, 0.00, 15.44]),
+    ("ncc", [0.88, 0.88, 0.85, 0.87, 0.87, 0.94, 0.79]),
+];
+
+/// Its rows beside ours.
 fn checkout_1() -> Vec<PaperValue> {
-    let table: [(&'static str, [f64; 7]); 4] = [
-        ("magnification", [1.04, 1.03, 1.03, 1.01, 1.00, 0.97, 1.04]),
-        ("roll_deg", [2.46, 2.46, 2.92, 3.27, 3.27, 0.06, 6.25]),
-        ("azimuth_change_deg", [6.01, 6.38, 8.53, 8.58, 8.62, 0.00, 15.44]),
-        ("ncc", [0.88, 0.88, 0.85, 0.87, 0.87, 0.94, 0.79]),
-    ];
-    let rows = table.into_iter().flat_map(|(column, values)| {
+    let rows = TABLE_III.into_iter().flat_map(|(column, values)| {
         (2_u32..).zip(values).map(move |(position, value)| PaperValue {
             configuration: "ncc-scale-roll",
             at: f64::from(position),

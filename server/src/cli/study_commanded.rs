@@ -24,7 +24,7 @@ pub(super) struct CheckoutsStudy {
     seed: u64,
     #[command(flatten)]
     images: ImageOptions,
-    /// What is written to the standard output.
+    /// Format of the output.
     #[arg(long, default_value = "text")]
     format: Format,
 }
@@ -40,7 +40,7 @@ pub(super) struct K9DayStudy {
     first_seed: u64,
     #[command(flatten)]
     images: ImageOptions,
-    /// What is written to the standard output.
+    /// Format of the output.
     #[arg(long, default_value = "text")]
     format: Format,
 }
@@ -62,7 +62,7 @@ impl ImageOptions {
     }
 }
 
-/// What is written to the standard output.
+/// Format of the output.
 #[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
 enum Format {
     /// Lines for people.

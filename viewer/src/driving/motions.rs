@@ -1,4 +1,4 @@
-//! The motions of a directed drive as text in the form: read while typed, with what is wrong.
+//! The text field for the motions of a directed drive. The text is parsed while it is typed; errors are shown below it.
 
 use egui::{Id, TextEdit, Ui};
 use sightline_rover::driving::{DriveCommand, Motion};
@@ -9,7 +9,7 @@ use crate::theme;
 pub(super) fn field(ui: &mut Ui, command: &mut DriveCommand) {
     let id = Id::unique("motions of the drive");
     let typed = ui.data(|data| data.get_temp::<String>(id));
-    // What was typed is kept as long as it is not about other motions.
+    // The typed text is kept until the command gets other motions.
     let is_own = |typed: &String| read(typed).map_or(true, |motions| motions == command.motions);
     let mut text = typed.filter(is_own).unwrap_or_else(|| written(&command.motions));
     let help = "Motions to drive one after the other instead of those to the goal: metres (0.5), turn and degrees (turn 20), or both \

@@ -19,7 +19,7 @@ pub enum Arrangement {
     Face,
     /// The middle of what is seen of the rock on which the targets' centre lies.
     Centre,
-    /// The middle of what is seen of each rock that the scenario places, in their order (R209).
+    /// One target on each placed rock, in the middle of its visible part (R209).
     Placed,
 }
 

@@ -85,8 +85,7 @@ impl View<'_> {
         self.middle_of_rock_at([centre.x, centre.y]).or_else(|| self.camera.project(&centre))
     }
 
-    /// The targets of the arrangement `placed`: the middle of what is seen of each rock that the scenario places, in their order,
-    /// where it is in the image.
+    /// The targets of the arrangement `placed`: the middle of the visible part of each placed rock, if it is in the image.
     pub(super) fn on_placed(&self) -> Vec<Pixel> {
         let centre = self.world.targets_centre();
         let middle = |rock: &PlacedRock| self.middle_of_rock_at([centre.x + rock.x_m, centre.y + rock.y_m]);
@@ -95,7 +94,7 @@ impl View<'_> {
         middles.filter(|pixel| pixel.is_inside(width, height)).take(self.rule.count as usize).collect()
     }
 
-    /// The middle of what is seen of the rock at a place, x and y of the site, m; `None` without a rock, or where none is seen of it.
+    /// The middle of the visible part of the rock at a place, x and y of the site, m; `None` without a visible rock there.
     fn middle_of_rock_at(&self, [x, y]: [f64; 2]) -> Option<Pixel> {
         let above = Point3::new(x, y, self.world.targets_centre().z) - HIGH_M * Vector3::z();
         let below = self.world.cast(&Ray { origin: above, direction: Vector3::z() })?;

@@ -8,7 +8,7 @@
 //! * `rows`: on the large rock, in `rows` straight rows of equal spacing (R110; `arranged.rs`).
 //! * `face`: on the large rock, `boundary` of them on an occluding boundary with another rock behind (R119).
 //! * `centre`: the middle of what is seen of the rock on which the targets' centre lies (`arranged.rs`).
-//! * `placed`: the same for each rock that the scenario places, in their order (R207, R209).
+//! * `placed`: the same for each placed rock, in the order of the scenario (R207, R209).
 //!
 //! The *large rock* is the one that most pixels near the targets' centre show.
 //!
