@@ -252,7 +252,8 @@ impl Under<'_> {
 
     /// Drives to the end of the present command.
     fn phase(&mut self, phase: &'static str, paper: Option<([usize; 3], f64)>) -> Result<()> {
-        let (steps, minutes) = (self.drive.steps.len(), self.minutes());
+        let steps = self.drive.steps.len();
+        let minutes: f64 = self.phases.iter().map(|phase| phase.minutes).sum();
         while self.drive.advance(self.settings, self.cancel)? {}
         let after = &self.drive.cycles[self.drive.cycles.len().min(steps.saturating_sub(1))..];
         let stops = &self.drive.steps[if self.phases.is_empty() { 0 } else { steps }..];
