@@ -29,7 +29,8 @@ use std::sync::atomic::AtomicBool;
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use sightline_geometry::camera::Camera;
-use sightline_world::{Eye, Region, Scenario, World};
+use sightline_world::scenario::CameraRig;
+use sightline_world::{Eye, Region, Scenario, World, library};
 
 /// Side of the rendered square in the middle of the picture, px.
 const SIDE_PX: u32 = 256;
@@ -92,4 +93,37 @@ fn near_one_thread(bencher: Bencher<'_, '_>) {
 #[divan::bench(sample_count = 5)]
 fn near_all_threads(bencher: Bencher<'_, '_>) {
     bench(bencher, 0, &scene().last);
+}
+
+/// The pictures of a drive among rocks as studies take them, 4 samples a pixel; one thread.
+fn bench_drive(bencher: Bencher<'_, '_>, rig: CameraRig, size: u32) {
+    let mut scenario = library::scenario("obstacles-10").expect("the library has the scenario");
+    scenario.camera.further.clear();
+    (scenario.camera.rig, scenario.camera.image_size, scenario.camera.samples_per_axis) = (rig, size, 2);
+    if rig == CameraRig::MerFrontHazcam {
+        // Farther away, the target is above its picture.
+        (scenario.drive.start_distance_m, scenario.drive.end_distance_m) = (2.5, 2.0);
+    }
+    let world = World::new(&scenario);
+    let index = sightline_world::index(&scenario, &world).expect("the scenario can be driven");
+    let camera = sightline_world::true_camera_in_site(&index.stops[0], Eye::Left)
+        .expect("a simulated stop has a camera");
+    let region = Region::whole(&camera);
+    let never = AtomicBool::new(false);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool of one thread");
+    bencher.counter(ItemsCount::new(size * size * 4)).bench_local(|| {
+        pool.install(|| sightline_world::clean_radiance(&world, &scenario, &camera, region, &never))
+    });
+}
+
+/// A picture of the mast.
+#[divan::bench(sample_count = 5)]
+fn mast_four_samples(bencher: Bencher<'_, '_>) {
+    bench_drive(bencher, CameraRig::MerNavcam, 512);
+}
+
+/// A picture of the body's cameras.
+#[divan::bench(sample_count = 5)]
+fn hazcam_four_samples(bencher: Bencher<'_, '_>) {
+    bench_drive(bencher, CameraRig::MerFrontHazcam, 256);
 }

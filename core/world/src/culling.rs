@@ -1,8 +1,8 @@
-//! Which rocks a ray can meet at all: a tree for any ray, a grid for the rays to the sun, a cone for a tile.
+//! Which rocks a ray can meet at all: a tree for any ray and for a tile, a grid for the rays to the sun, a cone for a tile.
 //!
 //! All three only leave out rocks whose bounding sphere the ray misses, so results never depend on them.
 //!
-//! * [`Tree`]: bounding boxes of spheres, split at the median of the longest axis.
+//! * [`Tree`]: bounding boxes of spheres, split at the median of the longest axis. For a cone, the sphere around a box is tested.
 //! * [`SunGrid`]: all rays to the sun are parallel. The rocks' spheres are projected along them on a plane,
 //!   whose cells list the discs that touch them: a shadow ray looks into one cell.
 //! * [`in_cone`]: a tile of the image sees a narrow cone; a sphere of radius r at distance |v| is in it when
@@ -94,6 +94,30 @@ impl Tree {
                 depth += 2;
             }
         }
+    }
+
+    /// Calls `visit` with the index of every rock that a cone of rays can meet, and of some more.
+    pub(crate) fn in_cone(&self, cone: &Cone, mut visit: impl FnMut(usize)) {
+        let mut open = Vec::from_iter(self.nodes.first());
+        while let Some(node) = open.pop() {
+            let (middle, radius_m) = node.sphere();
+            if !in_cone(cone, &middle, radius_m * 1.000_001) {
+                continue;
+            }
+            if node.count > 0 {
+                self.order[node.first..node.first + node.count].iter().for_each(|&rock| visit(rock));
+            } else {
+                open.extend(&self.nodes[node.first..node.first + 2]);
+            }
+        }
+    }
+}
+
+impl Node {
+    /// The middle of the box, and the radius of the sphere around it, m.
+    fn sphere(&self) -> (Point3, f64) {
+        let middle = Point3::from([0, 1, 2].map(|k| 0.5 * (self.low[k] + self.high[k])));
+        (middle, (Point3::from(self.high) - middle).norm())
     }
 }
 

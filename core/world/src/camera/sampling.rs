@@ -11,8 +11,9 @@
 //! octave shorter than c = max(2p/n, 2p/(n² μ)) gets no weight (μ is the cosine of emission: on ground seen
 //! at a grazing angle the pixel is long, but all n² rows of samples lie along its length).
 //!
-//! Tiles list the rocks that their cone of rays can meet, the nearest first (`culling.rs`). Every sample is a
-//! function of its own pixel alone, so neither tiles nor threads show in the picture.
+//! Tiles list the rocks that their cone of rays can meet, the nearest first (`culling.rs`). [`LANES`] rays are cast at once: those
+//! of one pixel, or of a block of neighbouring pixels that have fewer. Every sample is a function of its own pixel alone, so
+//! neither tiles, blocks nor threads show in the picture.
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
@@ -25,7 +26,7 @@
 use pulp::{Arch, Simd, WithSimd};
 
 use sightline_geometry::camera::Camera;
-use sightline_geometry::frames::{Pixel, Ray, Vector3};
+use sightline_geometry::frames::{Pixel, Point3, Ray, Vector3};
 
 use crate::camera::shading::Seen;
 use crate::culling::{Cone, in_cone};
@@ -54,6 +55,14 @@ pub(crate) struct Sampler<'a> {
 struct Corners {
     width: usize,
     rays: Vec<Option<Ray>>,
+    /// The same with their directions drawn out to the plane d·A = 1.
+    on_image_plane: Vec<Ray>,
+}
+
+/// Neighbouring pixels of a tile: the first, columns and rows.
+struct Block {
+    first: [usize; 2],
+    size: [usize; 2],
 }
 
 impl<'a> Sampler<'a> {
@@ -83,10 +92,10 @@ impl<'a> Sampler<'a> {
         let rocks = self.rocks_in_view(&corners, height);
         let count = self.offsets.len();
         let mut seen = Seen::new(width * height * count);
-        for y in 0..height {
-            for x in 0..width {
-                self.pixel(&corners, [x, y], &rocks, (y * width + x) * count, &mut seen);
-            }
+        match self.samples_per_axis {
+            1 => self.blocks::<16>(&corners, height, &rocks, &mut seen),
+            2 => self.blocks::<4>(&corners, height, &rocks, &mut seen),
+            _ => self.blocks::<1>(&corners, height, &rocks, &mut seen),
         }
         let of_pixels = seen.radiances(self.world).chunks(count);
         of_pixels.map(|samples| samples.iter().sum::<f32>() / count as f32).collect()
@@ -100,7 +109,10 @@ impl<'a> Sampler<'a> {
                 rays.push(self.camera.ray(pixel));
             }
         }
-        Corners { width, rays }
+        let nothing = Ray { origin: Point3::origin(), direction: self.axis };
+        let on_plane = |ray: &Option<Ray>| on_image_plane(ray.as_ref().unwrap_or(&nothing), &self.axis);
+        let on_image_plane = rays.iter().map(on_plane).collect();
+        Corners { width, rays, on_image_plane }
     }
 
     /// The rocks that any ray of the tile can meet, the nearest first, with their least distance, m.
@@ -108,53 +120,83 @@ impl<'a> Sampler<'a> {
         // A tile's edge can bulge beyond its corners by far less than this margin of one pixel.
         let margin_rad = self.rad_per_px * if corners.width.max(height) > 1 { 1.0 } else { 2.0 };
         let Some(cone) = Cone::around(corners.rays.iter().flatten(), margin_rad) else { return Vec::new() };
-        let rocks = self.world.scenery.rocks.iter().enumerate();
-        let mut list: Vec<(f64, usize)> = rocks
-            .filter(|(_, rock)| in_cone(&cone, &rock.centre, rock.radius_m))
-            .map(|(index, rock)| {
-                ((rock.centre - cone.apex).norm() - rock.radius_m - cone.apex_radius_m, index)
-            })
-            .collect();
-        list.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (scenery, mut list) = (&self.world.scenery, Vec::new());
+        scenery.tree.in_cone(&cone, |index| {
+            let rock = &scenery.rocks[index];
+            if in_cone(&cone, &rock.centre, rock.radius_m) {
+                let least_m = (rock.centre - cone.apex).norm() - rock.radius_m - cone.apex_radius_m;
+                list.push((least_m, index));
+            }
+        });
+        list.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         list
     }
 
-    /// Notes what the samples of a pixel meet, numbered from `first`; nothing where the camera model gives no ray.
+    /// Notes what the samples of a tile meet, in square blocks of `PIXELS` pixels.
     #[inline(always)]
-    fn pixel(
+    fn blocks<const PIXELS: usize>(
         &self,
         corners: &Corners,
-        [x, y]: [usize; 2],
+        height: usize,
         rocks: &[(f64, usize)],
-        first: usize,
         seen: &mut Seen,
     ) {
-        let at = y * (corners.width + 1) + x;
-        let below = at + corners.width + 1;
-        let [Some(a), Some(b), Some(c), Some(d)] =
-            [corners.rays[at], corners.rays[at + 1], corners.rays[below], corners.rays[below + 1]]
-        else {
-            return;
-        };
-        let Some(cone) = Cone::around([a, b, c, d].iter(), 0.0) else { return };
-        let scenery = &*self.world.scenery;
+        let side = PIXELS.isqrt();
+        for y in (0..height).step_by(side) {
+            for x in (0..corners.width).step_by(side) {
+                let size = [side.min(corners.width - x), side.min(height - y)];
+                let block = Block { first: [x, y], size };
+                if self.block::<PIXELS>(corners, &block, rocks, seen) {
+                    continue;
+                }
+                for first in block.pixels().filter(|_| PIXELS > 1) {
+                    self.block::<1>(corners, &Block { first, size: [1, 1] }, rocks, seen);
+                }
+            }
+        }
+    }
+
+    /// Notes what the samples of a block of `PIXELS` pixels at most meet; false, and nothing noted, where the camera model gives
+    /// no ray or where the rays of several pixels lie too far apart on the ground to be cast at once.
+    #[inline(always)]
+    fn block<const PIXELS: usize>(
+        &self,
+        corners: &Corners,
+        block: &Block,
+        rocks: &[(f64, usize)],
+        seen: &mut Seen,
+    ) -> bool {
+        let Some(cone) = corners.cone(block) else { return false };
+        let (scenery, count) = (&*self.world.scenery, self.offsets.len());
+        let clear_m = scenery.terrain.clear_m(&cone);
+        if PIXELS > 1 && clear_m.is_finite() && !scenery.terrain.is_narrow(&cone, clear_m) {
+            return false;
+        }
         let meets = |(_, index): &&(f64, usize)| {
             in_cone(&cone, &scenery.rocks[*index].centre, scenery.rocks[*index].radius_m)
         };
         seen.rocks_in_view.clear();
         seen.rocks_in_view.extend(rocks.iter().filter(meets));
-        let clear_m = scenery.terrain.clear_m(&cone);
-        let corners = [a, b, c, d].map(|ray| on_image_plane(&ray, &self.axis));
-        for (chunk, offsets) in self.offsets.chunks(LANES).enumerate() {
-            let rays = between(&corners, offsets);
+        // A block with fewer pixels repeats its first.
+        let mut of_pixels = [corners.of_pixel(block.first); PIXELS];
+        for (rays, pixel) in of_pixels.iter_mut().zip(block.pixels()).skip(1) {
+            *rays = corners.of_pixel(pixel);
+        }
+        let lanes = LANES / PIXELS;
+        for (chunk, offsets) in self.offsets.chunks(lanes).enumerate() {
+            let rays = between(&of_pixels, offsets);
             let (nearest_m, met) = self.rocks_met(&rays, &cone, &seen.rocks_in_view);
             let ground_m = scenery.terrain.cast_lanes(&rays, &cone, clear_m, &nearest_m);
-            for lane in 0..offsets.len() {
-                let rock = met[lane].map(|met| (nearest_m[lane], met));
-                let sample = first + chunk * LANES + lane;
-                self.note(sample, &rays.ray(lane), ground_m[lane], rock, seen);
+            for (pixel, [x, y]) in block.pixels().enumerate() {
+                let first = (y * corners.width + x) * count + chunk * lanes;
+                for sample in 0..offsets.len() {
+                    let lane = pixel * lanes + sample;
+                    let rock = met[lane].map(|met| (nearest_m[lane], met));
+                    self.note(first + sample, &rays.ray(lane), ground_m[lane], rock, seen);
+                }
             }
         }
+        true
     }
 
     /// The nearest rock and its plane on each ray, with its distance, m, infinite where there is none.
@@ -229,32 +271,69 @@ fn offsets(n: usize) -> Vec<[f64; 2]> {
     (0..n * n).map(|k| [place(k % n, part(k / n)), place(k / n, 1.0 - part(k % n))]).collect()
 }
 
+impl Block {
+    /// Its pixels, row by row.
+    #[inline(always)]
+    fn pixels(&self) -> impl Iterator<Item = [usize; 2]> {
+        let ([x, y], [columns, rows]) = (self.first, self.size);
+        (0..rows * columns).map(move |k| [x + k % columns, y + k / columns])
+    }
+}
+
+impl Corners {
+    /// The cone around the corners of a block's pixels; none where the camera model gives no ray through one.
+    #[inline(always)]
+    fn cone(&self, block: &Block) -> Option<Cone> {
+        let [x, y] = block.first;
+        let row = |y: usize| &self.rays[y * (self.width + 1) + x..][..=block.size[0]];
+        let rows = (y..=y + block.size[1]).map(row);
+        if rows.clone().flatten().any(Option::is_none) {
+            return None;
+        }
+        Cone::around(rows.flatten().flatten(), 0.0)
+    }
+
+    /// The rays of a pixel's corners: (0,0), (1,0), (0,1), (1,1).
+    #[inline(always)]
+    fn of_pixel(&self, [x, y]: [usize; 2]) -> [Ray; 4] {
+        let at = y * (self.width + 1) + x;
+        let below = at + self.width + 1;
+        [at, at + 1, below, below + 1].map(|corner| self.on_image_plane[corner])
+    }
+}
+
 /// The ray with its direction drawn out to the plane d·A = 1; near and beyond 90°, to some other length.
 fn on_image_plane(ray: &Ray, axis: &Vector3) -> Ray {
     Ray { origin: ray.origin, direction: ray.direction / ray.direction.dot(axis).max(0.1) }
 }
 
-/// The rays at positions (u, v), [`LANES`] at most, between those of a pixel's corners: (0,0), (1,0), (0,1), (1,1).
+/// The rays at positions (u, v), as many as a pixel has lanes at most, between those of each pixel's corners: (0,0), (1,0), (0,1),
+/// (1,1).
 #[inline(always)]
-fn between([a, b, c, d]: &[Ray; 4], offsets: &[[f64; 2]]) -> RayLanes {
+fn between<const PIXELS: usize>(corners: &[[Ray; 4]; PIXELS], offsets: &[[f64; 2]]) -> RayLanes {
+    let lanes = LANES / PIXELS;
     let (mut u, mut v) = ([offsets[0][0]; LANES], [offsets[0][1]; LANES]);
-    for (lane, offset) in offsets.iter().enumerate() {
-        [u[lane], v[lane]] = *offset;
+    for pixel in 0..PIXELS {
+        for (lane, offset) in offsets.iter().enumerate() {
+            [u[pixel * lanes + lane], v[pixel * lanes + lane]] = *offset;
+        }
     }
     let mut rays = RayLanes { origin: [[0.0; LANES]; 3], direction: [[0.0; LANES]; 3] };
     let mut squares = [0.0; LANES];
     for k in 0..3 {
-        for lane in 0..LANES {
-            let [u, v] = [u[lane], v[lane]];
-            let [wa, wb, wc, wd] = [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v];
-            let direction =
-                a.direction[k] * wa + b.direction[k] * wb + c.direction[k] * wc + d.direction[k] * wd;
-            let offset = (b.origin[k] - a.origin[k]) * wb
-                + (c.origin[k] - a.origin[k]) * wc
-                + (d.origin[k] - a.origin[k]) * wd;
-            rays.origin[k][lane] = a.origin[k] + offset;
-            rays.direction[k][lane] = direction;
-            squares[lane] += direction * direction;
+        for (pixel, [a, b, c, d]) in corners.iter().enumerate() {
+            for lane in pixel * lanes..(pixel + 1) * lanes {
+                let [u, v] = [u[lane], v[lane]];
+                let [wa, wb, wc, wd] = [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v];
+                let direction =
+                    a.direction[k] * wa + b.direction[k] * wb + c.direction[k] * wc + d.direction[k] * wd;
+                let offset = (b.origin[k] - a.origin[k]) * wb
+                    + (c.origin[k] - a.origin[k]) * wc
+                    + (d.origin[k] - a.origin[k]) * wd;
+                rays.origin[k][lane] = a.origin[k] + offset;
+                rays.direction[k][lane] = direction;
+                squares[lane] += direction * direction;
+            }
         }
     }
     let scale = squares.map(|square| 1.0 / square.sqrt());
@@ -306,7 +385,7 @@ mod tests {
             let corners = [corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0), corner(1.0, 1.0)]
                 .map(|ray| on_image_plane(&ray, &camera.model.axis()));
             for (u, v) in [(0.5, 0.5), (0.1, 0.7), (0.9, 0.9)] {
-                let ray = between(&corners, &[[u, v]]).ray(0);
+                let ray = between(&[corners], &[[u, v]]).ray(0);
                 let pixel = camera.project(&ray.at(5.0)).unwrap();
                 let wanted = Pixel::new(x + u - 0.5, y + v - 0.5);
                 assert!(pixel.distance(wanted) < 5e-5, "{}", pixel.distance(wanted));

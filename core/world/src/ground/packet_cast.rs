@@ -1,6 +1,6 @@
-//! The intersection of the rays of one pixel with the ground and with rocks, all at once.
+//! The intersection of the rays of one pixel, or of a few neighbouring ones, with the ground and with rocks, all at once.
 //!
-//! The rays of a pixel cross the same few cells. The columns of cells along the axis on which the rays advance most are
+//! Such rays cross the same few cells. The columns of cells along the axis on which the rays advance most are
 //! visited in order, and in each column the rows that any ray crosses. A cell's patch is the same for all rays, so that its
 //! quadratic (`terrain_cast.rs`) is solved for [`LANES`] rays by one program on vectors. Rays that leave this for any
 //! reason (a long footprint, the edge of the grid) are cast one by one.
@@ -27,7 +27,7 @@ use crate::ground::texture::{LANES, least};
 /// A number for each ray.
 pub(crate) type Lanes = [f64; LANES];
 
-/// The rays of a pixel, by component and lane; lanes without a ray repeat another.
+/// The rays of one or a few pixels, by component and lane; lanes without a ray repeat another.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RayLanes {
     /// Origins, site frame, m.
@@ -36,7 +36,7 @@ pub(crate) struct RayLanes {
     pub(crate) direction: [Lanes; 3],
 }
 
-/// Footprint of a pixel, in cells along the view, above which rays are cast one by one.
+/// Footprint of the rays, in cells along the view, above which rays are cast one by one.
 const FOOTPRINT_MAX: f64 = 10.0;
 /// Columns, and rows in one column, after which the remaining rays are cast one by one.
 const COLUMNS_MAX: usize = 40;
@@ -91,7 +91,7 @@ impl RayLanes {
 }
 
 impl Terrain {
-    /// Distances at which the rays of a pixel meet the ground before `to_m`, m; infinite where they do not.
+    /// Distances at which rays meet the ground before `to_m`, m; infinite where they do not.
     ///
     /// No ray meets the grid before `clear_m`, the [`Terrain::clear_m`] of `cone`.
     #[inline(always)]
@@ -111,7 +111,7 @@ impl Terrain {
     }
 
     /// Whether a cone of rays that comes near the ground at `clear_m` has a short footprint there.
-    fn is_narrow(&self, cone: &Cone, clear_m: f64) -> bool {
+    pub(crate) fn is_narrow(&self, cone: &Cone, clear_m: f64) -> bool {
         if clear_m <= 0.0 || !clear_m.is_finite() {
             return false;
         }

@@ -294,11 +294,16 @@ fn a_region_has_the_bits_of_the_whole_picture() {
     let big = Region { x: 400, y: 500, width: 90, height: 70 };
     let small = Region { x: 423, y: 517, width: 31, height: 29 };
     let seed = NoiseSeed { step: 12, eye: Eye::Right };
-    let record = |window: Region| recorded(&demo.world, &demo.scenario, &camera, window, seed);
-    let (whole, part) = (record(big), record(small));
-    for (whole, part) in [(whole.0, part.0), (whole.1, part.1)] {
-        for (x, y, pixel) in part.enumerate_pixels() {
-            assert_eq!(whole.get_pixel(x + 23, y + 17), pixel);
+    // With fewer samples a pixel, other neighbours share the rays that are cast at once.
+    for samples_per_axis in [1, 2, 4] {
+        let mut scenario = demo.scenario.clone();
+        scenario.camera.samples_per_axis = samples_per_axis;
+        let record = |window: Region| recorded(&demo.world, &scenario, &camera, window, seed);
+        let (whole, part) = (record(big), record(small));
+        for (whole, part) in [(whole.0, part.0), (whole.1, part.1)] {
+            for (x, y, pixel) in part.enumerate_pixels() {
+                assert_eq!(whole.get_pixel(x + 23, y + 17), pixel, "{samples_per_axis}: {x}, {y}");
+            }
         }
     }
 }
