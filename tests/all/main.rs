@@ -33,6 +33,7 @@ mod page_access;
 mod page_cameras;
 mod page_compare;
 mod page_debugger;
+mod page_directed;
 mod page_driving;
 mod page_odometry;
 mod page_exports;

@@ -22,11 +22,19 @@ async fn a_drive_without_a_safe_path_is_explained_and_a_branch_arrives_another_w
     let why = bench.json("/api/v1/sessions/s2/drive")["why"].clone();
     assert_eq!(why["cause"], "no_safe_path", "{why}");
 
+    // The whole drive is tried with a change, in the background, while the page stays where it is.
+    browser.click_on("button", "try the drive with navigator arcs instead of gestalt").await;
+    browser.control("button", "cancel the drive with navigator arcs instead of gestalt").await;
+    browser.says("arrived:").await;
+    browser.gone("button", "cancel the drive with navigator arcs instead of gestalt").await;
+    assert_eq!(browser.status().await["session"], "s2");
+    browser.shot("stop-cause-tried").await;
+
     // The change is put into the form, and a branch before the stop drives under it.
     browser.click_on("button", "use navigator arcs instead of gestalt").await;
     browser.go_to("0", 0).await;
     browser.click_on("button", "Branch at stop 0").await;
-    browser.wait_status("the branch", "s.session === 's3' && s.drive === 'arrived'").await;
+    browser.wait_status("the branch", "s.session === 's4' && s.drive === 'arrived'").await;
     browser.shot("stop-cause-branch").await;
     browser.end().await;
 }

@@ -1,5 +1,6 @@
 //! Driving on commands: the form of the command, the drive as the server has it, and the panel that shows both.
 
+pub(crate) mod data_flow;
 pub(crate) mod faults;
 pub(crate) mod hazards;
 pub(crate) mod map;
@@ -8,6 +9,7 @@ pub(crate) mod panel;
 pub(crate) mod paths;
 pub(crate) mod pause;
 pub(crate) mod stages;
+pub(crate) mod tried;
 pub(crate) mod update;
 pub(crate) mod visits;
 pub(crate) mod why;
@@ -30,6 +32,8 @@ pub struct Driving {
     pub pause: pause::PauseForm,
     /// The drive with the name of its session; `None` before it was read.
     pub view: Option<(String, DriveView)>,
+    /// The whole drives that are tried in the background, of all sessions.
+    pub tried: Vec<tried::TriedDrive>,
     /// The cursor's stop, and the one to which it goes with the rover once the page knows it.
     following: Option<[usize; 2]>,
     is_asked: bool,
@@ -60,4 +64,13 @@ pub enum Ask {
     OneStop,
     /// Drives on with the run that is looked at, under the command in the form.
     GoOn,
+    /// Tries the whole drive again under another command, in the background.
+    Try {
+        /// The command.
+        command: DriveCommand,
+        /// Its change in words, by which the drive is known.
+        change: String,
+    },
+    /// Ends the drive that is tried with a change and removes its session.
+    CancelTried(String),
 }

@@ -158,6 +158,8 @@ impl State {
                 self.steer(self.looked_at().zip(next).map(|(steering, next)| pause::until(steering, next)));
             }
             Ask::GoOn => self.steer(self.looked_at()),
+            Ask::Try { command, change } => self.try_drive(command, change),
+            Ask::CancelTried(change) => self.cancel_tried_drive(change),
         }
     }
 

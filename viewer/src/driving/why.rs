@@ -4,7 +4,7 @@ use egui::{Frame, Label, Margin, RichText, Stroke, Ui};
 use sightline_session::stop_cause::{DecisionChange, StopExplanation};
 
 use crate::command::{Command, Go};
-use crate::driving::Ask;
+use crate::driving::{Ask, tried};
 use crate::layout::command::LayoutCommand;
 use crate::panels::pane::Pane;
 use crate::state::State;
@@ -34,13 +34,13 @@ pub(crate) fn show_here(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             ui.label(theme::note("Other decisions on the images of this stop:"));
         }
         for change in &why.changes {
-            changed(ui, change, out);
+            changed(ui, state, change, out);
         }
     });
 }
 
-/// A change with its decision, and the button that puts it into the form.
-fn changed(ui: &mut Ui, change: &DecisionChange, out: &mut Vec<Command>) {
+/// A change with its decision, the button that puts it into the form, and the whole drive with it.
+fn changed(ui: &mut Ui, state: &State, change: &DecisionChange, out: &mut Vec<Command>) {
     ui.horizontal_wrapped(|ui| {
         if let Some(command) = &change.command {
             let help = "Puts this command into the form of the panel Drive; a branch at an earlier stop drives under it";
@@ -53,6 +53,7 @@ fn changed(ui: &mut Ui, change: &DecisionChange, out: &mut Vec<Command>) {
         let words = format!("{}: {}", change.text, change.decision);
         ui.add(Label::new(RichText::new(words).size(12.0).color(theme::text())).wrap());
     });
+    ui.horizontal_wrapped(|ui| tried::show(ui, state, change, out));
 }
 
 fn sentence(ui: &mut Ui, why: &StopExplanation) {

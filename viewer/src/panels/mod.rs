@@ -33,6 +33,9 @@ macro_rules! panel_table {
             Odometry: "odometry", "Odometry", Home(Group::Views, 7),
                 "The motion since the stop before by vision, against wheels and gyro: slip, gates and corners.",
                 odometry::panel::Odometry;
+            DataFlow: "data_flow", "Data flow", Home(Group::Views, 8),
+                "The components of targeted driving, and the last message between them.",
+                driving::data_flow::DataFlow;
             Budget: "budget", "Error budget", Home(Group::Views, 4),
                 "Error budget of stereo, navigation and drift.",
                 panels::budget::Budget;

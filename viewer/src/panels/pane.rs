@@ -183,6 +183,7 @@ mod tests {
             ("breakpoints", Pane::Breakpoints),
             ("drive", Pane::Drive),
             ("odometry", Pane::Odometry),
+            ("data_flow", Pane::DataFlow),
         ];
         for (name, pane) in stored {
             let text = serde_json::to_string(&pane).unwrap();

@@ -63,7 +63,7 @@ impl State {
                 self.run_went_on(target, run);
                 self.drive_went_on();
             }
-            Event::RunProgress { .. } => {}
+            Event::RunProgress { session, .. } => self.tried_drive_went_on(&session),
             Event::CursorMoved { session, cursor } if is_ours(&session) => self.cursor_went(cursor),
             Event::CursorMoved { .. } => {}
             Event::RenderProgress { traverse, k, n, ready } => self.rendered(&traverse, k, n, ready),
@@ -73,7 +73,10 @@ impl State {
                 self.question_went_on(StepKey { session, target, run, step });
             }
             Event::NotesChanged { session } => self.notes_changed(session),
-            Event::SessionRemoved { session } => self.session_removed(&session),
+            Event::SessionRemoved { session } => {
+                self.tried_drive_removed(&session);
+                self.session_removed(&session);
+            }
             Event::ImportProgress { job } => self.import_went_on(job),
             Event::TraverseRemoved { traverse } => self.drive_removed(&traverse),
         }
@@ -113,6 +116,7 @@ impl State {
         self.progress.clear();
         self.sync.session_stale = true;
         self.trackability_stale();
+        self.tried_drives_stale();
         self.studies.make_stale();
         if self.settings.is_empty() {
             self.read_settings();

@@ -399,6 +399,7 @@ impl State {
         self.sync_session();
         self.sync_trackability();
         self.sync_driving();
+        self.sync_tried_drives();
         self.sync_tour();
         self.sync_ask();
     }

@@ -64,12 +64,12 @@ use crate::state::{Progress, State};
 use crate::theme;
 
 /// A panel on a screen of its own, with the commands that it gave.
-struct Shown<'a> {
+pub(crate) struct Shown<'a> {
     harness: Harness<'a, Vec<Command>>,
 }
 
 impl<'a> Shown<'a> {
-    fn new(
+    pub(crate) fn new(
         size: [f32; 2],
         state: impl FnOnce(&egui::Context) -> State + 'a,
         show: impl Fn(&mut egui::Ui, &State, &mut Vec<Command>) + 'a,
@@ -93,13 +93,13 @@ impl<'a> Shown<'a> {
         Self { harness }
     }
 
-    fn pane(pane: Pane, state: impl FnOnce(&egui::Context) -> State + 'static) -> Shown<'static> {
+    pub(crate) fn pane(pane: Pane, state: impl FnOnce(&egui::Context) -> State + 'static) -> Shown<'static> {
         Shown::new([520.0, 420.0], state, move |ui, state, out| {
             show_pane(ui, pane, state, out);
         })
     }
 
-    fn says(&self, words: &str) -> &Self {
+    pub(crate) fn says(&self, words: &str) -> &Self {
         let texts = std::cell::RefCell::new(Vec::new());
         let found = self.harness.query_all_by(|node| {
             let all: Vec<String> = [node.label(), node.value()].into_iter().flatten().collect();
@@ -120,11 +120,11 @@ impl<'a> Shown<'a> {
     }
 
     /// Whether a text or control on the screen is called so.
-    fn has(&self, label: &str) -> bool {
+    pub(crate) fn has(&self, label: &str) -> bool {
         self.harness.query_all_by_label(label).count() > 0
     }
 
-    fn click(&mut self, label: &str) -> Vec<Command> {
+    pub(crate) fn click(&mut self, label: &str) -> Vec<Command> {
         self.harness.get_by_label(label).click();
         self.harness.run_steps(2);
         self.asked()
