@@ -44,6 +44,12 @@ async fn the_page_shows_ground_paths_and_votes_of_a_drive_that_avoids_a_rock() {
     browser.says("paths are not vetoed").await;
     browser.says("(chosen)").await;
     browser.shot("hazards").await;
+    // The same ground as a layer of the left image.
+    browser.click_on("button", "legend").await;
+    browser.click_on("checkbox", "goodness of the ground, red is bad").await;
+    browser.shot("hazards-layer").await;
+    browser.click_on("checkbox", "goodness of the ground, red is bad").await;
+    browser.click_on("button", "legend").await;
 
     // The drive goes on round the rock, to 2 m from the target.
     browser.show_panel("Drive").await;

@@ -31,6 +31,8 @@ pub struct HazardView {
     pub value: Vec<f32>,
     /// Where the goodness comes from.
     pub basis: Vec<CellBasis>,
+    /// Measured height, z of the site frame (down), m; null where too little was measured.
+    pub height_m: Vec<Option<f32>>,
 }
 
 impl HazardView {
@@ -63,6 +65,11 @@ impl HazardView {
                 .map(|cell| limiting(cell).map_or(0.0, |(_, value)| (1000.0 * value).round() / 1000.0) as f32)
                 .collect(),
             basis: map.cells.iter().map(|cell| cell.basis).collect(),
+            height_m: map
+                .cells
+                .iter()
+                .map(|cell| cell.height_m.map(|height_m| (1000.0 * height_m).round() / 1000.0))
+                .collect(),
         }
     }
 
@@ -93,6 +100,7 @@ mod tests {
             limited_by: vec![None; 16],
             value: vec![0.0; 16],
             basis: vec![CellBasis::Unknown; 16],
+            height_m: vec![None; 16],
         };
         assert_eq!(view.index_at([-0.9, 2.1]), Some(0));
         assert_eq!(view.index_at([-0.4, 3.9]), Some(7));

@@ -32,6 +32,8 @@ pub struct TargetedDrive {
     pub maps: HazardMaps,
     /// The visits that have ended, of a drive to several targets.
     pub visits: Vec<Visit>,
+    /// The settings of the last step.
+    settings: Settings,
     /// The steps of the targets to which it drives afterwards.
     then: VecDeque<Vec<Arc<RunStep>>>,
 }
@@ -81,7 +83,8 @@ impl TargetedDrive {
         };
         check_command(world.traverse(), &command, &steps[0].trace)?;
         let (cycles, maps, visits) = (Vec::new(), HazardMaps::default(), Vec::new());
-        Ok(Self { world, command, target: 0, steps, cycles, maps, visits, then: all })
+        let settings = settings.clone();
+        Ok(Self { world, command, target: 0, steps, cycles, maps, visits, settings, then: all })
     }
 
     /// Whether it is a drive to several targets.
@@ -116,6 +119,7 @@ impl TargetedDrive {
             before: self.cycles.last(),
             hazards: hazards.as_deref(),
         };
+        self.settings.clone_from(settings);
         let before = self.world.state().to_vec();
         let advanced = executive::advance(&mut self.world, &input, settings, cancel)
             .and_then(|(cycle, trace)| Ok((cycle, trace, self.track_others(settings, cancel)?)));
@@ -154,7 +158,8 @@ impl TargetedDrive {
     pub fn visit_next(&mut self) -> bool {
         let Some(ending) = self.ending() else { return false };
         if !self.then.is_empty() || !self.visits.is_empty() {
-            let visit = Visit::of(&self.world, &self.command, (self.target, &self.steps), &ending);
+            let why = self.why();
+            let visit = Visit::of(&self.world, &self.command, (self.target, &self.steps), &ending, why);
             self.visits.push(visit);
         }
         if !ending.reason.is_of_target() {
@@ -194,6 +199,7 @@ impl TargetedDrive {
     /// Why the drive stopped; `None` while it goes on, and where it has arrived.
     pub fn why(&mut self) -> Option<StopExplanation> {
         let (traverse, maps) = (self.world.traverse(), &mut self.maps);
-        Explained::default().of(traverse, &self.command, &self.steps, &self.cycles, maps)
+        let told = (&self.steps[..], &self.settings);
+        Explained::default().of(traverse, &self.command, told, &self.cycles, maps)
     }
 }

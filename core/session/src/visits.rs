@@ -12,6 +12,7 @@ use utoipa::ToSchema;
 use crate::Session;
 use crate::driving::{Steering, summary};
 use crate::step::RunStep;
+use crate::stop_cause::StopExplanation;
 use sightline_geometry::error::{Error, Result};
 use sightline_recordings::DrivenTraverse;
 use sightline_rover::driving::{DriveCommand, Ending, StopReason};
@@ -31,6 +32,9 @@ pub struct Visit {
     /// Details of the reason; null where there are none.
     #[serde(default)]
     pub detail: Option<String>,
+    /// Root cause of an end before the goal, its evidence, and changes that alter the decision there; null where it has arrived.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub why: Option<StopExplanation>,
     /// Distance between the estimated and the true target in the rover frame at that stop, m; null without truth.
     pub target_error_m: Option<f64>,
     /// Horizontal distance of the true rover from the goal that follows from the true target, m; null without truth.
@@ -44,6 +48,7 @@ impl Visit {
         command: &DriveCommand,
         (target, steps): (usize, &[Arc<RunStep>]),
         ending: &Ending,
+        why: Option<StopExplanation>,
     ) -> Self {
         let first = steps.first().map_or(0, |first| first.step);
         let outcome = summary(world, command, steps, &[]);
@@ -53,6 +58,7 @@ impl Visit {
             until: steps.last().map_or(first, |last| last.step),
             reason: ending.reason,
             detail: ending.detail.clone(),
+            why,
             target_error_m: outcome.target_error_m,
             goal_error_m: outcome.goal_error_m,
         }
@@ -60,16 +66,21 @@ impl Visit {
 }
 
 impl Session {
-    /// Notes how the drive to its target ended at the last stop, and sends the rover to the next one; returns the target and run
+    /// Notes how the drive to its target ended at the last stop, and `why`, and sends the rover to the next one; returns the target and run
     /// that drive now. `None` where there is no next one, or the rover cannot drive on.
     ///
     /// # Errors
     /// [`Error::Request`] when nobody drives.
-    pub fn visit_next(&mut self, world: &DrivenTraverse, ending: &Ending) -> Result<Option<(usize, usize)>> {
+    pub fn visit_next(
+        &mut self,
+        world: &DrivenTraverse,
+        ending: &Ending,
+        why: Option<StopExplanation>,
+    ) -> Result<Option<(usize, usize)>> {
         let steering = self.steering.clone();
         let steering = steering.ok_or_else(|| Error::Request("nobody drives in this session".to_owned()))?;
         let run = self.run(steering.target, steering.run)?;
-        let visit = Visit::of(world, &steering.command, (steering.target, run.whole_steps()), ending);
+        let visit = Visit::of(world, &steering.command, (steering.target, run.whole_steps()), ending, why);
         let until = visit.until;
         // A drive that was continued, under a changed command perhaps, ends the same visit again.
         self.visits.retain(|known| (known.target, known.since) != (visit.target, visit.since));

@@ -69,6 +69,12 @@ fn targets_are_visited_in_turn_and_a_lost_one_is_dropped() {
     println!("{:#?}", drive.visits);
     let reasons: Vec<StopReason> = drive.visits.iter().map(|visit| visit.reason).collect();
     assert_eq!(reasons[..2], [StopReason::Arrived, StopReason::Lost]);
+    let [first, second] = [0, 1].map(|visit: usize| drive.visits[visit].why.as_ref());
+    assert_eq!(first, None, "it has arrived");
+    let why = second.expect("the reason of a loss");
+    let start = format!("The target was lost at stop {from_stop}: ");
+    assert!(why.sentence.starts_with(&start) && !why.evidence.is_empty(), "{why:?}");
+    assert!(!why.evidence.iter().any(|sentence| sentence.contains("truth")), "{why:?}");
     let third = &drive.visits[2];
     assert!(third.since == drive.visits[1].until && third.until > third.since, "it was driven to: {third:?}");
 }

@@ -11,7 +11,7 @@
 //! by its path, because paths follow the stages and not the pictures. The close-up shows the same as the left
 //! image, from the frame of the subframe, which goes with the target. A run that asks for the shape has two tabs, “Match”
 //! and “Shape”; the second has what the shape tracker saw, the meshes and how well they fit. Beside the left image is a tab with
-//! the corners of odometry, where stops have it.
+//! the corners of odometry, where stops have it. The map also has goal, ground and paths of a drive on commands, the log its decisions.
 
 use std::collections::BTreeSet;
 
@@ -213,7 +213,8 @@ fn picture(name: &str, origin: &str, overlays: &[&str], roots: &[&str]) -> Part 
 }
 
 fn map(outlook: &Outlook, roots: &[&str]) -> Part {
-    let contents = std::iter::once("/rover/**".to_owned()).chain(of_all(&MAP, roots));
+    let of_rover = ["/rover/**", "/drive/**"].map(str::to_owned);
+    let contents = of_rover.into_iter().chain(of_all(&MAP, roots));
     let eye = EyeControls3D::new()
         .with_position(point_3d(&outlook.eye))
         .with_look_target(point_3d(&outlook.target))
@@ -286,7 +287,8 @@ fn time_series(series: &[Series], root: &str) -> Part {
 }
 
 fn words(roots: &[&str]) -> Part {
-    let log = View::new("TextLog", "log", of_all(&["/{target}/judge/verdict"], roots));
+    let decisions = std::iter::once("/drive/decision".to_owned());
+    let log = View::new("TextLog", "log", decisions.chain(of_all(&["/{target}/judge/verdict"], roots)));
     let document = |name: &str, origin: String| -> Part {
         View::new("TextDocument", name, ["$origin"]).with_origin(origin).into()
     };

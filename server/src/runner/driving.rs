@@ -47,7 +47,9 @@ impl Runner {
     fn visit_next(&self, live: &LiveSession, ending: &Ending) -> Result<()> {
         let open = live.traverse();
         let Some(driven) = &open.driven else { return Ok(()) };
-        let visit = |session: &mut Session| driven.with(|world| Ok(session.visit_next(world, ending)?));
+        // Found before the session is changed: it looks at the hazard maps, which are locked before the world.
+        let why = driven::view(live).why;
+        let visit = |session: &mut Session| driven.with(|world| Ok(session.visit_next(world, ending, why)?));
         let next = live.change_and(&self.store, visit, |_| ());
         let next = next.map_err(|problem| Error::Request(problem.problem().detail.clone()))?;
         let session = self.session_of(live);

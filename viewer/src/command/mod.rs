@@ -98,6 +98,8 @@ pub enum Layer {
     Compared,
     /// How well a target would do, while one is picked.
     Trackability,
+    /// The goodness of the ground on the left image.
+    Ground,
     /// The corners of visual odometry on the left image.
     Odometry,
     /// The corners of one fate, on the left image and in the panel of odometry.
@@ -106,8 +108,8 @@ pub enum Layer {
 
 impl Layer {
     /// Those that would drown the picture: they are switched on by whoever wants them.
-    pub const HIDDEN_AT_FIRST: [Self; 4] =
-        [Self::Keypoints, Self::OutlierFlow, Self::Residuals, Self::Odometry];
+    pub const HIDDEN_AT_FIRST: [Self; 5] =
+        [Self::Keypoints, Self::OutlierFlow, Self::Residuals, Self::Odometry, Self::Ground];
 }
 
 /// What the pointer and the keys mean at the moment.

@@ -43,6 +43,7 @@ impl HazardRaster {
             + size_of_val(view.limited_by.as_slice())
             + size_of_val(view.value.as_slice())
             + size_of_val(view.basis.as_slice())
+            + size_of_val(view.height_m.as_slice())
             + 4 * view.side * view.side
     }
 }
@@ -83,6 +84,11 @@ impl State {
     /// The goodness map of the cursor's stop.
     pub(crate) fn hazards(&self) -> Slot<'_, HazardRaster> {
         self.hazards_key().map_or(Slot::Absent, |key| self.cache.hazards(&key))
+    }
+
+    /// Whether the navigator chose on a goodness map at the cursor's stop.
+    pub(crate) fn has_hazards(&self) -> bool {
+        self.hazards_key().is_some()
     }
 
     /// The name of the goodness map of the cursor's stop, where the navigator chose on one.

@@ -2,6 +2,7 @@
 
 pub(crate) mod data_flow;
 pub(crate) mod faults;
+pub(crate) mod ground;
 pub(crate) mod hazards;
 pub(crate) mod map;
 mod motions;

@@ -76,6 +76,9 @@ fn sentence(label: &str, visit: &Visit) -> String {
         other => format!("dropped, {}", other.word()),
     };
     let mut words = format!("{label}: {reason} at stop {}", visit.until);
+    if let Some(why) = &visit.why {
+        words += &format!(". {}", why.sentence);
+    }
     if visit.reason == StopReason::Arrived
         && let (Some(target_m), Some(goal_m)) = (visit.target_error_m, visit.goal_error_m)
     {
@@ -97,6 +100,7 @@ mod tests {
             until: 9,
             reason,
             detail: None,
+            why: None,
             target_error_m: Some(0.004),
             goal_error_m: Some(0.012),
         };
@@ -108,6 +112,13 @@ mod tests {
         assert_eq!(
             sentence("flat rock", &visit(StopReason::Lost)),
             "flat rock: dropped, target lost at stop 9"
+        );
+        let why = serde_json::json!({ "step": 9, "reason": "lost", "cause": null, "sentence": "The target was lost at stop 7: hidden.",
+            "evidence": [], "changes": [] });
+        let lost = Visit { why: Some(serde_json::from_value(why).unwrap()), ..visit(StopReason::Lost) };
+        assert_eq!(
+            sentence("flat rock", &lost),
+            "flat rock: dropped, target lost at stop 9. The target was lost at stop 7: hidden."
         );
     }
 }

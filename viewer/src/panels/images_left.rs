@@ -11,6 +11,7 @@ use crate::compare::panel::{bar, marks as compared, modes};
 use crate::drawing::overlay::{Line, Mark, Overlay};
 use crate::drawing::raster::Raster;
 use crate::drawing::view2d::Canvas;
+use crate::driving::ground;
 use crate::layout::left_image::keep_left_image;
 use crate::odometry::corners;
 use crate::panels::broken;
@@ -101,6 +102,7 @@ fn picture(
 
 /// The marks of the step: other targets, corners, features, and what the tracker knew of its target.
 fn paint_marks(canvas: &Canvas, state: &State) {
+    ground::paint(canvas, state);
     paint_others(canvas, state);
     corners::paint_left(canvas, state);
     let Some(trace) = state.trace_on_image().filter(|_| state.shows_target()) else { return };
@@ -224,6 +226,7 @@ fn entries_of_step(state: &State) -> Vec<Entry> {
     entries.extend(marks::left_entries(state));
     entries.extend(compared::entries(state));
     entries.extend(corners::left_entry(state));
+    entries.extend(ground::entry(state));
     entries
 }
 

@@ -2,6 +2,7 @@
 
 use egui::{ColorImage, TextureId};
 
+use crate::command::Layer;
 use crate::drawing::raster::Raster;
 use crate::panels::pane::{Need, Pane};
 use crate::state::State;
@@ -21,7 +22,7 @@ impl State {
         self.compare.wants_metrics = needs.contains(&Need::Metrics);
         self.wants_history = needs.contains(&Need::MatchedWindows);
         self.wants_odometry = needs.contains(&Need::Odometry);
-        self.wants_hazards = needs.contains(&Need::Hazards);
+        self.wants_hazards = needs.contains(&Need::Hazards) || self.shows(Layer::Ground);
         self.want_tried_scores(needs.contains(&Need::TriedScores));
         if needs.contains(&Need::Explanation) {
             self.want_question();

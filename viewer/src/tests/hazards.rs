@@ -10,7 +10,8 @@ use sightline_session::hazard_view::{HazardView, UNKNOWN};
 use super::Shown;
 use super::fixture;
 use crate::cache::{Item, Key};
-use crate::command::{Command, Stage};
+use crate::command::{Command, Layer, Stage};
+use crate::driving::ground;
 use crate::driving::hazards::{HazardRaster, texels, words_at};
 use crate::panels::pane::{Need, Pane};
 use crate::state::State;
@@ -30,6 +31,7 @@ fn view() -> HazardView {
         limited_by: vec![Some(HazardTerm::Step), Some(HazardTerm::Unknown), None, None],
         value: vec![0.21, 0.1, 0.0, 0.0],
         basis: vec![CellBasis::Measured, CellBasis::Unknown, CellBasis::Measured, CellBasis::Exempt],
+        height_m: vec![Some(0.3), None, Some(0.3), None],
     }
 }
 
@@ -134,4 +136,59 @@ fn the_inspector_lists_every_path_with_its_vote_or_its_first_failing_cell() {
     shown.says("1 of 2 paths are not vetoed").says("radius 16 m right (chosen)");
     shown.says("step 21.0 cm at 0.40 m, limit 18.0 cm").says("0.85");
     shown.says("the rover cannot stand at its goal, where the step is 0.400 m, limit 0.182 m; the nearest place that it can reach is 1.20 m");
+}
+
+#[test]
+fn the_ground_lies_over_the_left_image_where_the_camera_sees_it() {
+    let camera = sightline_geometry::camera::Mast::spirit().left_in_head;
+    // A map of 20 × 20 cells of 10 cm, from 4 m ahead of the camera, 1 m below it.
+    let side = 20;
+    let view = HazardView {
+        cell_m: 0.1,
+        side,
+        corner_m: [4.0, -1.0],
+        goodness_percent: (0..side * side).map(|index| if index == 5 { UNKNOWN } else { 80 }).collect(),
+        limited_by: vec![None; side * side],
+        value: vec![0.0; side * side],
+        basis: vec![CellBasis::Measured; side * side],
+        height_m: (0..side * side).map(|index| (index != 7).then_some(1.0)).collect(),
+        ..view()
+    };
+    let ahead = sightline_geometry::frames::Pose::identity();
+    let cells = ground::cells(&view, &camera, &ahead);
+    let in_picture = |index: &usize| {
+        let at = |number: usize, first_m: f64| first_m + (number as f64 + 0.5) * 0.1;
+        camera.sees(&sightline_geometry::frames::Point3::new(
+            at(index / side, 4.0),
+            at(index % side, -1.0),
+            1.0,
+        ))
+    };
+    let seen = (0..side * side).filter(in_picture).count();
+    assert!(seen > 100, "{seen}");
+    assert_eq!(
+        cells.len(),
+        (0..side * side).filter(|index| *index != 5 && *index != 7).filter(in_picture).count()
+    );
+    for (corners, percent) in &cells {
+        assert_eq!(*percent, 80);
+        // Farther rows are higher in the picture, and the right of the rover is on the right.
+        assert!(corners[3].y < corners[0].y && corners[1].x > corners[0].x, "{corners:?}");
+    }
+    let behind = sightline_geometry::frames::Pose::translation(20.0, 0.0, 0.0);
+    assert!(ground::cells(&view, &camera, &behind).is_empty());
+}
+
+#[test]
+fn the_layer_of_the_ground_is_listed_where_there_is_a_goodness_map_and_fetches_it() {
+    let context = egui::Context::default();
+    let mut state = driving(&context);
+    assert!(ground::entry(&state).is_some());
+    state.fetch_for_panels(&[]);
+    let wants = |state: &State| state.wanted().iter().any(|key| matches!(key, Key::Hazards { .. }));
+    assert!(!wants(&state), "it is hidden at first");
+    state.perform(Command::ToggleLayer(Layer::Ground));
+    state.fetch_for_panels(&[]);
+    assert!(wants(&state));
+    assert!(ground::entry(&fixture::at_step(&context, STEP)).is_none());
 }

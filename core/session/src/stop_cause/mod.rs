@@ -9,6 +9,8 @@
 //! | `no_safe_path`, or `limit_cycle` or `goal_blocked` without a safe arc | `no_safe_path` | the term that vetoes most paths, and by how much |
 //! | `limit_cycle` | `limit_cycle` | the stops at one place, and what moves the rover away from the goal there |
 //!
+//! A drive whose target was lost has the root cause of that loss as its sentence (`loss`), and no cause of its own.
+//!
 //! *No way on*: `no_safe_path`, `goal_blocked`, `limit_cycle`, `stop_limit`, `time`. Estimates, decisions and results of the stages are
 //! the only input: neither scenario nor truth.
 //!
@@ -16,6 +18,7 @@
 
 mod blocked;
 mod changes;
+mod loss;
 mod slip;
 pub mod words;
 
@@ -26,9 +29,11 @@ use utoipa::ToSchema;
 
 pub use self::changes::DecisionChange;
 use sightline_geometry::cancel::Cancel;
+use sightline_recordings::Traverse;
 use sightline_rover::driving::ending::visits;
 use sightline_rover::driving::{Cycle, DriveCommand, HazardMaps, StopHazards, StopReason};
 use sightline_rover::pipeline::Stops;
+use sightline_track::settings::Settings;
 use sightline_track::trace::StepTrace;
 
 use self::words::{listed, metres};
@@ -99,9 +104,9 @@ impl Explained {
     /// Why a drive with these steps and decisions stopped; `None` while it goes on, and where it has arrived.
     pub(crate) fn of(
         &mut self,
-        stops: &dyn Stops,
+        stops: &Traverse,
         command: &DriveCommand,
-        steps: &[Arc<RunStep>],
+        (steps, settings): (&[Arc<RunStep>], &Settings),
         cycles: &[Cycle],
         maps: &mut HazardMaps,
     ) -> Option<StopExplanation> {
@@ -115,13 +120,21 @@ impl Explained {
         {
             return explanation.clone();
         }
+        let is_lost = ending.reason == StopReason::Lost;
+        let lost = is_lost.then(|| loss::loss(stops, steps, settings)).flatten();
         let steps: Vec<&StepTrace> = steps.iter().map(|step| &step.trace).collect();
         let map = |step: &&StepTrace| {
             // Never cancelled: the decisions were made on these maps.
             maps.at(stops, command, [steps[0], step], Cancel::default()).ok().flatten()
         };
         let hazards: Vec<Arc<StopHazards>> = steps.iter().map_while(map).collect();
-        let explanation = StoppedDrive { stops, command, steps: &steps, cycles, hazards: &hazards }.explain();
+        let drive = StoppedDrive { stops, command, steps: &steps, cycles, hazards: &hazards };
+        let mut explanation = drive.explain();
+        if let (Some(explanation), Some((sentence, evidence))) = (&mut explanation, lost)
+            && explanation.cause.is_none()
+        {
+            (explanation.sentence, explanation.evidence) = (sentence, evidence);
+        }
         self.last = Some((command.clone(), cycles.to_vec(), explanation.clone()));
         explanation
     }

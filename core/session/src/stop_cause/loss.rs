@@ -1,0 +1,27 @@
+//! Why the target of a drive was lost: the root cause of the first of the updates that were rejected in a row.
+
+use std::sync::Arc;
+
+use sightline_recordings::Traverse;
+use sightline_track::settings::Settings;
+
+use crate::step::RunStep;
+use crate::why::Book;
+
+/// The stop of that update with its root cause, and its evidence; `None` if the last update was accepted.
+///
+/// The steps are looked at without their comparison with the truth.
+pub(super) fn loss(
+    traverse: &Traverse,
+    steps: &[Arc<RunStep>],
+    settings: &Settings,
+) -> Option<(String, Vec<String>)> {
+    let is_good = |step: &Arc<RunStep>| step.verdict().is_some_and(|verdict| verdict.good);
+    let after = steps.iter().rposition(is_good).map_or(1, |last| last + 1);
+    let first = (after..steps.len()).find(|&place| steps[place].verdict().is_some())?;
+    let untold = |place: usize| RunStep { truth: None, ..steps[place].as_ref().clone() };
+    let (step, before) = (untold(first), untold(first - 1));
+    let book = Book { trace: &step, before: Some(&before), settings, prediction_px: None, sources: traverse };
+    let summary = book.summary();
+    Some((format!("The target was lost at stop {}: {}", step.step, summary.headline), summary.bullets))
+}
