@@ -16,8 +16,12 @@ use crate::panels::sheets::{Cell, Column, Sheet};
 use crate::state::State;
 use crate::theme;
 
-/// Smallest size of the drawing, points.
+/// Smallest size of the drawing in a narrow panel, points.
 const LEAST: [f32; 2] = [330.0, 500.0];
+/// From this width on it can be lower, points.
+const WIDE: f32 = 560.0;
+/// Its smallest height there, points.
+const LOW: f32 = 340.0;
 /// Free space between two components, points.
 const GAP: [f32; 2] = [18.0, 18.0];
 /// Columns and rows of the drawing.
@@ -154,7 +158,9 @@ fn sheets(state: &State) -> Result<Vec<Sheet>, String> {
 fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let messages = messages(state);
     ScrollArea::both().auto_shrink(false).show(ui, |ui| {
-        let size = ui.available_size().max(LEAST.into());
+        let room = ui.available_size();
+        let least = if room.x < WIDE { LEAST } else { [WIDE, LOW] };
+        let size = room.max(least.into());
         let (whole, _) = ui.allocate_exact_size(size, egui::Sense::hover());
         for message in &messages {
             arrow(ui, message, whole);
@@ -365,7 +371,7 @@ mod tests {
 
     #[test]
     fn every_edge_has_its_last_message_and_a_component_leads_to_its_record() {
-        let mut shown = Shown::new([560.0, 460.0], driving, |ui, state, out| show(ui, state, out));
+        let mut shown = Shown::new([560.0, 460.0], driving, show);
         for words in [
             "→ goal: standoff 1.50 m, tolerance 5.0 cm",
             "→ navigator: (4.00, 0.50) m, 3.00 m away",

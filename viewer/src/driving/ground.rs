@@ -1,7 +1,7 @@
 //! The layer of the goodness map over the left image: every known cell as a square at its height, through the camera of the stop.
 
-use egui::Shape;
 use egui::epaint::{Mesh, Vertex, WHITE_UV};
+use egui::{Rect, Shape};
 use sightline_geometry::camera::Camera;
 use sightline_geometry::frames::{Pixel, Point3, Pose};
 use sightline_session::hazard_view::{HazardView, UNKNOWN};
@@ -38,7 +38,11 @@ pub(crate) fn paint(canvas: &Canvas, state: &State) {
         mesh.add_triangle(first, first + 1, first + 2);
         mesh.add_triangle(first, first + 2, first + 3);
     }
-    canvas.painter.add(Shape::mesh(mesh));
+    let [width, height] = [camera.width(), camera.height()].map(f64::from);
+    let picture = [Pixel::new(-0.5, -0.5), Pixel::new(width - 0.5, height - 0.5)];
+    let [first, last] = picture.map(|corner| canvas.transform.to_screen(corner));
+    let clip = Rect::from_two_pos(first, last).intersect(canvas.painter.clip_rect());
+    canvas.painter.with_clip_rect(clip).add(Shape::mesh(mesh));
 }
 
 /// The cells with a height whose middle the camera sees: corners in its image, px, and goodness, %.

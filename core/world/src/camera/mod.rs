@@ -3,6 +3,7 @@
 pub(crate) mod picture;
 pub mod rig;
 pub(crate) mod sampling;
+mod pixel_rays;
 mod shading;
 pub(crate) mod optics;
 pub mod render;

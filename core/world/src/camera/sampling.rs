@@ -3,9 +3,7 @@
 //! A pixel is the mean over its area, taken at n × n samples on a fixed grid, turned a little: sample (i, j)
 //! lies at x = (i + (j + ½)/n)/n, y = (j + 1 − (i + ½)/n)/n of the pixel. All n² columns and rows are
 //! distinct, and x and y are uncorrelated, so the pixel is no wider along one diagonal than along the other.
-//! Rays at the corners of pixels come from the true camera model; within a pixel they are joined bilinearly
-//! on the plane d·A = 1, where a linear camera's rays lie evenly, and made unit. What distortion bends
-//! within one pixel is lost: less than 5e-5 px (tested).
+//! Rays at the corners of pixels come from the true camera model, those between follow from them (`pixel_rays.rs`).
 //!
 //! Texture that the samples cannot carry is left out: with the footprint p = distance · rad per pixel, an
 //! octave shorter than c = max(2p/n, 2p/(n² μ)) gets no weight (μ is the cosine of emission: on ground seen
@@ -26,8 +24,9 @@
 use pulp::{Arch, Simd, WithSimd};
 
 use sightline_geometry::camera::Camera;
-use sightline_geometry::frames::{Pixel, Point3, Ray, Vector3};
+use sightline_geometry::frames::{Ray, Vector3};
 
+use crate::camera::pixel_rays::{Block, Corners, between};
 use crate::camera::shading::Seen;
 use crate::culling::{Cone, in_cone};
 use crate::ground::packet_cast::{Lanes, RayLanes};
@@ -49,20 +48,6 @@ pub(crate) struct Sampler<'a> {
     axis: Vector3,
     /// Of the ground, site frame.
     mean_normal: Vector3,
-}
-
-/// The rays of a tile's pixel corners, rows of `width` + 1.
-struct Corners {
-    width: usize,
-    rays: Vec<Option<Ray>>,
-    /// The same with their directions drawn out to the plane d·A = 1.
-    on_image_plane: Vec<Ray>,
-}
-
-/// Neighbouring pixels of a tile: the first, columns and rows.
-struct Block {
-    first: [usize; 2],
-    size: [usize; 2],
 }
 
 impl<'a> Sampler<'a> {
@@ -88,7 +73,7 @@ impl<'a> Sampler<'a> {
 
     #[inline(always)]
     fn sample_tile(&self, [x0, y0]: [i64; 2], [width, height]: [usize; 2]) -> Vec<f32> {
-        let corners = self.corners(x0, y0, width, height);
+        let corners = Corners::new(self.camera, &self.axis, [x0, y0], [width, height]);
         let rocks = self.rocks_in_view(&corners, height);
         let count = self.offsets.len();
         let mut seen = Seen::new(width * height * count);
@@ -99,20 +84,6 @@ impl<'a> Sampler<'a> {
         }
         let of_pixels = seen.radiances(self.world).chunks(count);
         of_pixels.map(|samples| samples.iter().sum::<f32>() / count as f32).collect()
-    }
-
-    fn corners(&self, x0: i64, y0: i64, width: usize, height: usize) -> Corners {
-        let mut rays = Vec::with_capacity((width + 1) * (height + 1));
-        for y in 0..=height {
-            for x in 0..=width {
-                let pixel = Pixel::new((x0 + x as i64) as f64 - 0.5, (y0 + y as i64) as f64 - 0.5);
-                rays.push(self.camera.ray(pixel));
-            }
-        }
-        let nothing = Ray { origin: Point3::origin(), direction: self.axis };
-        let on_plane = |ray: &Option<Ray>| on_image_plane(ray.as_ref().unwrap_or(&nothing), &self.axis);
-        let on_image_plane = rays.iter().map(on_plane).collect();
-        Corners { width, rays, on_image_plane }
     }
 
     /// The rocks that any ray of the tile can meet, the nearest first, with their least distance, m.
@@ -271,80 +242,6 @@ fn offsets(n: usize) -> Vec<[f64; 2]> {
     (0..n * n).map(|k| [place(k % n, part(k / n)), place(k / n, 1.0 - part(k % n))]).collect()
 }
 
-impl Block {
-    /// Its pixels, row by row.
-    #[inline(always)]
-    fn pixels(&self) -> impl Iterator<Item = [usize; 2]> {
-        let ([x, y], [columns, rows]) = (self.first, self.size);
-        (0..rows * columns).map(move |k| [x + k % columns, y + k / columns])
-    }
-}
-
-impl Corners {
-    /// The cone around the corners of a block's pixels; none where the camera model gives no ray through one.
-    #[inline(always)]
-    fn cone(&self, block: &Block) -> Option<Cone> {
-        let [x, y] = block.first;
-        let row = |y: usize| &self.rays[y * (self.width + 1) + x..][..=block.size[0]];
-        let rows = (y..=y + block.size[1]).map(row);
-        if rows.clone().flatten().any(Option::is_none) {
-            return None;
-        }
-        Cone::around(rows.flatten().flatten(), 0.0)
-    }
-
-    /// The rays of a pixel's corners: (0,0), (1,0), (0,1), (1,1).
-    #[inline(always)]
-    fn of_pixel(&self, [x, y]: [usize; 2]) -> [Ray; 4] {
-        let at = y * (self.width + 1) + x;
-        let below = at + self.width + 1;
-        [at, at + 1, below, below + 1].map(|corner| self.on_image_plane[corner])
-    }
-}
-
-/// The ray with its direction drawn out to the plane d·A = 1; near and beyond 90°, to some other length.
-fn on_image_plane(ray: &Ray, axis: &Vector3) -> Ray {
-    Ray { origin: ray.origin, direction: ray.direction / ray.direction.dot(axis).max(0.1) }
-}
-
-/// The rays at positions (u, v), as many as a pixel has lanes at most, between those of each pixel's corners: (0,0), (1,0), (0,1),
-/// (1,1).
-#[inline(always)]
-fn between<const PIXELS: usize>(corners: &[[Ray; 4]; PIXELS], offsets: &[[f64; 2]]) -> RayLanes {
-    let lanes = LANES / PIXELS;
-    let (mut u, mut v) = ([offsets[0][0]; LANES], [offsets[0][1]; LANES]);
-    for pixel in 0..PIXELS {
-        for (lane, offset) in offsets.iter().enumerate() {
-            [u[pixel * lanes + lane], v[pixel * lanes + lane]] = *offset;
-        }
-    }
-    let mut rays = RayLanes { origin: [[0.0; LANES]; 3], direction: [[0.0; LANES]; 3] };
-    let mut squares = [0.0; LANES];
-    for k in 0..3 {
-        for (pixel, [a, b, c, d]) in corners.iter().enumerate() {
-            for lane in pixel * lanes..(pixel + 1) * lanes {
-                let [u, v] = [u[lane], v[lane]];
-                let [wa, wb, wc, wd] = [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v];
-                let direction =
-                    a.direction[k] * wa + b.direction[k] * wb + c.direction[k] * wc + d.direction[k] * wd;
-                let offset = (b.origin[k] - a.origin[k]) * wb
-                    + (c.origin[k] - a.origin[k]) * wc
-                    + (d.origin[k] - a.origin[k]) * wd;
-                rays.origin[k][lane] = a.origin[k] + offset;
-                rays.direction[k][lane] = direction;
-                squares[lane] += direction * direction;
-            }
-        }
-    }
-    let scale = squares.map(|square| 1.0 / square.sqrt());
-    for axis in &mut rays.direction {
-        for lane in 0..LANES {
-            axis[lane] *= scale[lane];
-        }
-    }
-    rays
-}
-
 /// [`Rock::enter_lanes`] for rays whose origins differ.
 fn enter_one_by_one(rock: &Rock, rays: &RayLanes) -> (Lanes, [usize; LANES]) {
     let (mut enter_m, mut planes) = ([f64::INFINITY; LANES], [0; LANES]);
@@ -375,23 +272,6 @@ impl WithSimd for Tile<'_, '_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sightline_geometry::camera::Mast;
-
-    #[test]
-    fn rays_within_a_pixel_are_those_of_the_camera_model() {
-        let camera = Mast::spirit().left_in_head;
-        for (x, y) in [(0.0, 0.0), (511.0, 400.0), (1023.0, 1023.0), (3.0, 900.0)] {
-            let corner = |dx: f64, dy: f64| camera.ray(Pixel::new(x + dx - 0.5, y + dy - 0.5)).unwrap();
-            let corners = [corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0), corner(1.0, 1.0)]
-                .map(|ray| on_image_plane(&ray, &camera.model.axis()));
-            for (u, v) in [(0.5, 0.5), (0.1, 0.7), (0.9, 0.9)] {
-                let ray = between(&[corners], &[[u, v]]).ray(0);
-                let pixel = camera.project(&ray.at(5.0)).unwrap();
-                let wanted = Pixel::new(x + u - 0.5, y + v - 0.5);
-                assert!(pixel.distance(wanted) < 5e-5, "{}", pixel.distance(wanted));
-            }
-        }
-    }
 
     #[test]
     fn samples_cover_the_pixel_evenly() {
