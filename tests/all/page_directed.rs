@@ -33,7 +33,7 @@ async fn typed_motions_are_driven_and_the_target_is_handed_off() {
     browser.says("→ locomotor: turn").await;
     browser.says("→ pose estimate: 0.30 m by the wheels from stop 0").await;
     browser.shot("data-flow").await;
-    browser.click_on("link", "mast pointing").await;
-    browser.wait_status("its stage", "s.stage === 'point_mast'").await;
+    browser.click_on("link", "goal").await;
+    browser.wait_status("its stage", "s.stage === 'set_goal'").await;
     browser.end().await;
 }
