@@ -17,8 +17,8 @@
 //! | light, openness, normal | 150 | 75 |
 //!
 //! together about 330 cycles, 8.2 million samples a second on a core at 2.7 GHz; without wide vectors about a third of it.
-//! With four samples a pixel or one, the rays of 4 or 16 neighbouring pixels are cast at once (`camera/sampling.rs`); what is done once
-//! a pixel (corners' rays, noise of the detector) then weighs more.
+//! With four samples a pixel or one, the rays of 4 or 16 neighbouring pixels are cast at once (`camera/sampling.rs`); the work
+//! per pixel (rays through its corners, noise of the detector) is then a larger part of the time.
 //!
 //! A 1024 × 1024 picture with 16 samples a pixel is 16.8 million samples: 3 s on one core at most, and 17 stereo pairs one
 //! minute on two. Building the world is not counted.

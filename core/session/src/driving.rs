@@ -87,8 +87,8 @@ impl DriveView {
         let goes_on = !is_driving && summary.reason.is_none() && run.why_stopped().is_none();
         let halted = || pause::halted(steering, &run.steps, world.traverse().stop_count());
         let paused = goes_on.then(halted).flatten();
-        let told = (run.whole_steps(), &*run.settings);
-        let why = explained.of(world.traverse(), &steering.command, told, &cycles, maps);
+        let tracked = (run.whole_steps(), &*run.settings);
+        let why = explained.of(world.traverse(), &steering.command, tracked, &cycles, maps);
         let (steering, summary) = (Some(steering.clone()), Some(summary));
         let faults = world.faults().to_vec();
         Self { steering, cycles, visits: Vec::new(), faults, summary, why, is_driving, paused }

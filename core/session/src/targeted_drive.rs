@@ -199,7 +199,7 @@ impl TargetedDrive {
     /// Why the drive stopped; `None` while it goes on, and where it has arrived.
     pub fn why(&mut self) -> Option<StopExplanation> {
         let (traverse, maps) = (self.world.traverse(), &mut self.maps);
-        let told = (&self.steps[..], &self.settings);
-        Explained::default().of(traverse, &self.command, told, &self.cycles, maps)
+        let tracked = (&self.steps[..], &self.settings);
+        Explained::default().of(traverse, &self.command, tracked, &self.cycles, maps)
     }
 }

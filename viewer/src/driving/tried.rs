@@ -263,7 +263,7 @@ mod tests {
         calls.filter(|(path, _): &(String, _)| !path.starts_with("sessions/s1/drive")).collect()
     }
 
-    /// The card of the drive with what it has tried.
+    /// The card of the stopped drive, with these tried drives.
     fn shown(all: Vec<TriedDrive>) -> Shown<'static> {
         let state = move |context: &egui::Context| {
             let mut state = stopped(context);

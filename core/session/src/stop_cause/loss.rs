@@ -19,8 +19,8 @@ pub(super) fn loss(
     let is_good = |step: &Arc<RunStep>| step.verdict().is_some_and(|verdict| verdict.good);
     let after = steps.iter().rposition(is_good).map_or(1, |last| last + 1);
     let first = (after..steps.len()).find(|&place| steps[place].verdict().is_some())?;
-    let untold = |place: usize| RunStep { truth: None, ..steps[place].as_ref().clone() };
-    let (step, before) = (untold(first), untold(first - 1));
+    let without_truth = |place: usize| RunStep { truth: None, ..steps[place].as_ref().clone() };
+    let (step, before) = (without_truth(first), without_truth(first - 1));
     let book = Book { trace: &step, before: Some(&before), settings, prediction_px: None, sources: traverse };
     let summary = book.summary();
     Some((format!("The target was lost at stop {}: {}", step.step, summary.headline), summary.bullets))

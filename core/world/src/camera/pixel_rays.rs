@@ -82,8 +82,8 @@ fn on_image_plane(ray: &Ray, axis: &Vector3) -> Ray {
     Ray { origin: ray.origin, direction: ray.direction / ray.direction.dot(axis).max(0.1) }
 }
 
-/// The rays at positions (u, v), as many as a pixel has lanes at most, between those of each pixel's corners: (0,0), (1,0), (0,1),
-/// (1,1).
+/// The rays at the positions `offsets` (u, v) of each pixel, [`LANES`] / `PIXELS` at most, interpolated between the rays of the pixel's
+/// corners (0,0), (1,0), (0,1), (1,1).
 #[inline(always)]
 pub(super) fn between<const PIXELS: usize>(corners: &[[Ray; 4]; PIXELS], offsets: &[[f64; 2]]) -> RayLanes {
     let lanes = LANES / PIXELS;

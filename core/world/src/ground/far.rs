@@ -9,7 +9,7 @@
 //!
 //! **Intersection.** Along a ray `F(t) = z_ray(t) − z(t)`, above 0 below the ground, has the sign of the cubic
 //! `P(t) = (p + d_z t)(A t² + 2 B t + C) − ρ0² (s_o + s_d t)`. Between the roots of P' it is monotone, so that
-//! the first of these intervals at whose end F is no longer below 0 holds the hit; it is found between chord and middle
+//! the first of these intervals at whose end F is no longer below 0 holds the hit; it is found by secants and bisection
 //! down to neighbouring numbers.
 //!
 //! | symbol | name | unit, frame |
@@ -130,8 +130,8 @@ fn turns([c3, c2, c1]: [f64; 3]) -> [f64; 2] {
 
 /// The first number at which `below_m` is no longer negative, between one where it is and one where it is not.
 ///
-/// Where the curve is nearly straight, the root is within a thousandth of the interval of the chord's: two probes there leave
-/// little of it. The middle halves it in any case.
+/// If the curve is nearly straight, the root lies within a thousandth of the interval from the root of the chord, and the two probes
+/// there enclose it. The middle halves the interval in any case.
 fn first_below(below_m: impl Fn(f64) -> f64, mut above: f64, mut below: f64) -> f64 {
     let (mut from_m, mut to_m) = (below_m(above), below_m(below));
     loop {
