@@ -9,13 +9,14 @@ use sightline_geometry::error::Error;
 use sightline_recordings::{DrivenTraverse, create_simulated};
 use sightline_rover::driving::executive::{self, CycleInput};
 use sightline_rover::driving::{
-    ArcNavigator, ArrivalAction, DriveCommand, GoalRule, OdometryPair, StopReason,
+    ArcNavigator, ArrivalAction, Cycle, DriveCommand, GoalRule, OdometryPair, StopReason,
 };
 use sightline_rover::pipeline;
 use sightline_session::replayed_drive::ReplayedDrive;
 use sightline_session::targeted_drive::TargetedDrive;
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
+use sightline_track::trace::StepTrace;
 use sightline_world::rover::driven::DrivenStop;
 use sightline_world::scenario::{PlacedRock, RockShape};
 use sightline_world::{Scenario, choose_targets, library};
@@ -114,10 +115,27 @@ fn a_look_after_arrival_is_one_more_stop_with_the_target_at_the_centre() {
 }
 
 #[test]
-fn without_the_comparison_with_the_truth_a_drive_has_the_same_bits() {
+fn without_the_comparison_with_the_truth_and_on_one_thread_a_drive_has_the_same_bits() {
     let folder = tempfile::tempdir().unwrap();
     let judged = drive(&folder.path().join("judged"));
-    let (mut world, designation) = world(&folder.path().join("blind"));
+    let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let (world, steps, cycles) = one_thread.install(|| drive_blind(&folder.path().join("blind")));
+    assert!(steps.len() > 10);
+    assert_eq!(cycles, judged.cycles);
+    assert_eq!(world.state(), judged.world.state());
+    assert_eq!(steps.len(), judged.steps.len());
+    // The designation alone may carry a warning that the truth adds.
+    for (blind, judged) in steps.iter().zip(&judged.steps).skip(1) {
+        assert_eq!(*blind, judged.trace);
+    }
+    let last = steps.len() - 1;
+    let images = [&world, &judged.world].map(|world| world.traverse().capture(last).unwrap());
+    assert_eq!(images[0], images[1]);
+}
+
+/// A complete drive without any comparison with the truth.
+fn drive_blind(folder: &Path) -> (DrivenTraverse, Vec<StepTrace>, Vec<Cycle>) {
+    let (mut world, designation) = world(folder);
     let settings = Settings::default();
     let mut steps = vec![pipeline::designate(world.traverse(), designation, &settings).unwrap()];
     let mut cycles = Vec::new();
@@ -134,32 +152,9 @@ fn without_the_comparison_with_the_truth_a_drive_has_the_same_bits() {
         cycles.push(cycle);
         match step {
             Some(step) => steps.push(step),
-            None => break,
+            None => return (world, steps, cycles),
         }
     }
-    assert_eq!(cycles, judged.cycles);
-    assert_eq!(world.state(), judged.world.state());
-    assert_eq!(steps.len(), judged.steps.len());
-    // The designation alone may carry a warning that the truth adds.
-    for (blind, judged) in steps.iter().zip(&judged.steps).skip(1) {
-        assert_eq!(*blind, judged.trace);
-    }
-}
-
-#[test]
-fn one_thread_and_two_drive_with_the_same_bits() {
-    let folder = tempfile::tempdir().unwrap();
-    let drives = [1, 2].map(|count| {
-        let threads = rayon::ThreadPoolBuilder::new().num_threads(count).build().unwrap();
-        threads.install(|| drive(&folder.path().join(format!("{count}"))))
-    });
-    let [one, two] = &drives;
-    assert!(one.steps.len() > 10);
-    assert_eq!(one.world.state(), two.world.state());
-    assert_eq!((&one.steps, &one.cycles), (&two.steps, &two.cycles));
-    let last = one.steps.len() - 1;
-    let images = drives.each_ref().map(|drive| drive.world.traverse().capture(last).unwrap());
-    assert_eq!(images[0], images[1]);
 }
 
 #[test]

@@ -32,7 +32,7 @@ settings_group! {
         /// Step from which on the goodness is 0.
         step_bad_m: f64 = 0.20, "m", Domain::Between(0.001, 2.0), "ours, after Goldberg02";
         /// The heights of a cell's points spread by more: they are on the face of an obstacle, which is as high as its upper edge.
-        face_spread_m: f64 = 0.05, "m", Domain::Between(0.0, 2.0), "ours; docs/driving.md";
+        face_spread_m: f64 = 0.03, "m", Domain::Between(0.0, 2.0), "ours; docs/driving.md";
         /// Points in the disc from which on their number does not reduce the certainty.
         points_full: f64 = 40.0, "", Domain::Between(3.0, 10_000.0), "ours, after Goldberg02";
         /// A cell is known if its decayed number of points is at least this.
@@ -48,7 +48,7 @@ settings_group! {
         /// 1σ of the disparity of a point: its height is that uncertain, and steps must exceed what follows from it.
         disparity_sigma_px: f64 = 0.25, "px", Domain::Between(0.0, 5.0), "ours; Kim09 §4.2 has 1/3";
         /// By so many 1σ of their heights' difference two cells must differ, before the rest counts as a step.
-        step_sigmas: f64 = 1.0, "", Domain::Between(0.0, 10.0), "ours";
+        step_sigmas: f64 = 0.25, "", Domain::Between(0.0, 10.0), "ours";
         /// Least slope of the image for a match, fraction of full scale per px. Too low: points in the sky; too high: holes.
         range_texture_min: f64 = 0.003, "1/px", Domain::Between(0.0, 0.1), "ours; docs/driving.md";
         /// Share by which the best match must be better than any other.

@@ -80,8 +80,8 @@ fn a_step_is_what_exceeds_the_error_of_the_heights() {
     };
     assert!((step(0.0) - 0.3).abs() < 1e-6);
     // 1σ of 5 cm each: 1σ of the difference is 7 cm.
-    assert!((step(5e-6) - (0.3 - 0.1 * 0.5f64.sqrt())).abs() < 2e-3, "{}", step(5e-6));
-    assert!(step(4e-5) < 1e-6, "within the error");
+    assert!((step(5e-6) - (0.3 - settings.step_sigmas * 0.1 * 0.5f64.sqrt())).abs() < 2e-3, "{}", step(5e-6));
+    assert!(step(1e-4) < 1e-6, "within the error");
 }
 
 #[test]
