@@ -47,11 +47,13 @@ impl Tour<'_> {
     }
 }
 
-/// The controls, once they are the same in two looks at the page.
+/// The controls, once they are the same in two looks at the page. On a busy machine a frame takes longer than the pause, and
+/// an open window has its final size in the frame after the resize.
 async fn settled(browser: &Browser) -> Vec<Control> {
     let mut before = Vec::new();
     for _ in 0..40 {
         tokio::time::sleep(Duration::from_millis(250)).await;
+        browser.frames().await;
         let now = browser.controls().await;
         if now == before {
             break;

@@ -61,6 +61,11 @@ impl Control {
 }
 
 impl Browser {
+    /// Waits until three frames were painted.
+    pub async fn frames(&self) {
+        self.evaluate(FRAMES).await;
+    }
+
     /// Everything on the page, in reading order.
     pub async fn controls(&self) -> Vec<Control> {
         let list = self.evaluate(LIST).await;
@@ -120,7 +125,7 @@ impl Browser {
         let mut before = self.control(role, name).await;
         loop {
             tokio::time::sleep(Duration::from_millis(80)).await;
-            self.evaluate(FRAMES).await;
+            self.frames().await;
             let control = self.control(role, name).await;
             if !control.disabled && control.rect == before.rect {
                 let (x, y) = control.middle();
