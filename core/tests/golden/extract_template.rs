@@ -127,6 +127,7 @@ fn affine(sheet: &mut Sheet, affine: &AffineRefinement) {
 
 fn tried(sheet: &mut Sheet, tried: &TriedTemplate) {
     sheet.put("template_stop", tried.template_step);
+    sheet.put("warped", tried.warped);
     sheet.put("scale", tried.scale);
     sheet.put("roll_rad", tried.roll_rad);
     sheet.put("score", tried.score);

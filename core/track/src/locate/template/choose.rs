@@ -2,17 +2,21 @@
 //!
 //! * `reference_templates`: the template and the appearances that it replaced, newest first. Renewals on condition are some
 //!   way apart, so that these differ in distance and in the line of sight.
+//! * `surface_warp`: each of them warped by the slope of its surface, and scaled and rolled by the geometry. Where the
+//!   window covers two surfaces, such as a rock and the ground before it, the measured slope is that of neither, and the
+//!   warped window matches beside the target; at 10 m by half a pixel, which every renewal of the template adds up.
 //! * `transform = search`: for each of them every pair of a scale and a roll from a grid, without the geometry (R224).
 //!   Scales are spaced by a ratio and rolls by a step, both about none.
 //!
-//! Each is matched by the first stage, and the highest score of the measure wins, the first among equals. A match against
-//! an older appearance starts from that appearance's drift.
+//! Each is matched by the first stage, and the highest score wins, the first among equals: the score in focus, which counts
+//! the surroundings of the target most, or that of the measure where there is no focus. A match against an older appearance
+//! starts from that appearance's drift.
 
 use super::failure::TemplateFailure;
 use super::first_match::FirstMatch;
-use super::match_template::{TriedTemplate, first_match};
+use super::match_template::{TriedTemplate, first_match, fit};
 use super::memory::{Appearance, Kept, TemplateMemory};
-use super::scale_roll::{Prepared, ScaleRoll, scale_roll};
+use super::scale_roll::{Preparation, Prepared, ScaleRoll, scale_roll};
 use super::settings::{TemplateSettings, Transform};
 use crate::locate::tracker::LocateInput;
 use sightline_geometry::estimate::drift::Drift;
@@ -61,48 +65,41 @@ pub(super) fn choose<'a>(
     let appearances: Vec<(&Appearance, Drift, Pose)> = std::iter::once(current)
         .chain(older.map(|kept| (&kept.appearance, kept.drift, now_from_kept(input, memory, kept))))
         .collect();
-    let pairs = transforms(settings);
-    let mut best: Option<Chosen<'a>> = None;
+    let preparations = preparations(settings);
+    let mut best: Option<(f64, Chosen<'a>)> = None;
     let mut unmatched: Option<Unmatched> = None;
     let (mut tried, mut comparisons) = (Vec::new(), 0);
-    let left = &input.pointing.left;
-    for (appearance, drift, now_from_then) in &appearances {
-        for pair in &pairs {
+    for (appearance, drift, now_from_template) in appearances {
+        let mut is_warped = false;
+        for &preparation in &preparations {
             if input.cancel.is_requested() {
                 return Err(Unmatched { scale_roll: None, missing: TemplateFailure::NoTemplate });
             }
-            let prepared = match scale_roll(appearance, now_from_then, left, settings, *pair) {
-                Ok(prepared) => prepared,
-                Err(missing) => {
-                    unmatched.get_or_insert(Unmatched { scale_roll: None, missing });
-                    continue;
-                }
-            };
-            let first = match first_match(&prepared, input, settings) {
-                Ok(first) => first,
-                Err(missing) => {
-                    unmatched
-                        .get_or_insert(Unmatched { scale_roll: Some(Box::new(prepared.record)), missing });
-                    continue;
-                }
-            };
+            if preparation == Preparation::ScaleRoll && !is_warped {
+                // It is the window that was matched last.
+                continue;
+            }
+            let (prepared, first) =
+                match attempt(appearance, &now_from_template, preparation, input, settings) {
+                    Ok(matched) => matched,
+                    Err(missing) => {
+                        unmatched.get_or_insert(missing);
+                        continue;
+                    }
+                };
+            is_warped = prepared.record.warped;
             comparisons += first.positions;
-            tried.push(describe(&prepared, &first));
-            if best.as_ref().is_none_or(|best| first.peak.score > best.first.peak.score) {
+            let score = fit(&prepared, &first, input.capture.pair.left.as_ref(), settings);
+            tried.push(describe(&prepared, score));
+            if best.as_ref().is_none_or(|(highest, _)| score > *highest) {
                 let (tried, comparisons) = (Vec::new(), 0);
-                best = Some(Chosen {
-                    prepared,
-                    now_from_template: *now_from_then,
-                    first,
-                    drift: *drift,
-                    tried,
-                    comparisons,
-                });
+                let chosen = Chosen { prepared, now_from_template, first, drift, tried, comparisons };
+                best = Some((score, chosen));
             }
         }
     }
     match (best, unmatched) {
-        (Some(best), _) => {
+        (Some((_, best)), _) => {
             let tried = if tried.len() > 1 { tried } else { Vec::new() };
             Ok(Chosen { tried, comparisons, ..best })
         }
@@ -111,24 +108,42 @@ pub(super) fn choose<'a>(
     }
 }
 
-fn describe(prepared: &Prepared<'_>, first: &FirstMatch) -> TriedTemplate {
-    TriedTemplate {
-        template_step: prepared.record.template_step,
-        scale: prepared.record.applied_scale,
-        roll_rad: prepared.record.applied_roll_rad,
-        score: first.peak.score,
+/// The first stage's match of one template.
+fn attempt<'a>(
+    appearance: &'a Appearance,
+    now_from_template: &Pose,
+    preparation: Preparation,
+    input: &LocateInput<'a>,
+    settings: &TemplateSettings,
+) -> Result<(Prepared<'a>, FirstMatch), Unmatched> {
+    let left = &input.pointing.left;
+    let prepared = scale_roll(appearance, now_from_template, left, settings, preparation)
+        .map_err(|missing| Unmatched { scale_roll: None, missing })?;
+    match first_match(&prepared, input, settings) {
+        Ok(first) => Ok((prepared, first)),
+        Err(missing) => Err(Unmatched { scale_roll: Some(Box::new(prepared.record)), missing }),
     }
 }
 
-/// The pairs of scale and roll (rad) to try; none stands for what the geometry says.
-fn transforms(settings: &TemplateSettings) -> Vec<Option<(f64, f64)>> {
+fn describe(prepared: &Prepared<'_>, score: f64) -> TriedTemplate {
+    TriedTemplate {
+        template_step: prepared.record.template_step,
+        warped: prepared.record.warped,
+        scale: prepared.record.applied_scale,
+        roll_rad: prepared.record.applied_roll_rad,
+        score,
+    }
+}
+
+/// How each appearance is prepared, in the order in which the windows are matched.
+fn preparations(settings: &TemplateSettings) -> Vec<Preparation> {
     if settings.transform == Transform::Geometry {
-        return vec![None];
+        return vec![Preparation::Surface, Preparation::ScaleRoll];
     }
     let [scales, rolls] = settings.search_steps();
-    let pair = |i: i32, j: i32| {
-        let roll_rad = (settings.search_roll_step_deg * f64::from(j)).to_radians();
-        Some((settings.search_scale_ratio.powi(i), roll_rad))
+    let given = |i: i32, j: i32| Preparation::Given {
+        scale: settings.search_scale_ratio.powi(i),
+        roll_rad: (settings.search_roll_step_deg * f64::from(j)).to_radians(),
     };
-    (-scales..=scales).flat_map(|i| (-rolls..=rolls).map(move |j| pair(i, j))).collect()
+    (-scales..=scales).flat_map(|i| (-rolls..=rolls).map(move |j| given(i, j))).collect()
 }

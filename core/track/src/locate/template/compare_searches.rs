@@ -19,8 +19,10 @@ pub fn compare_searches(
     let appearance = &before.memory.template()?.appearance;
     let now_from_template = site_from_rover.inverse() * appearance.site_from_rover;
     let left = &step.point_mast.left;
-    let prepared = scale_roll(appearance, &now_from_template, left, settings, None).ok()?;
-    let region = step.template()?.match_template.as_ref()?.search_window;
+    let evidence = step.template()?;
+    let preparation = evidence.scale_roll.as_ref()?.preparation();
+    let prepared = scale_roll(appearance, &now_from_template, left, settings, preparation).ok()?;
+    let region = evidence.match_template.as_ref()?.search_window;
     let (similarity, descent, size) = (settings.similarity(), settings.descent(), settings.template_size_px);
     let wide = prepared.window(size + 2 * descent.margin_px(&similarity, size));
     compare(&similarity, &wide, size, &step.capture()?.pair.left, region, &descent)

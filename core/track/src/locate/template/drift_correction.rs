@@ -14,7 +14,7 @@ use super::choose::now_from_kept;
 use super::match_noise::match_noise;
 use super::match_template::refine;
 use super::memory::TemplateMemory;
-use super::scale_roll::scale_roll;
+use super::scale_roll::{Preparation, scale_roll};
 use super::settings::TemplateSettings;
 use crate::locate::tracker::LocateInput;
 use sightline_geometry::estimate::drift::Drift;
@@ -53,7 +53,8 @@ pub(super) fn correct(
     let now_from_first = now_from_kept(input, memory, first);
     let image = input.capture.pair.left.as_ref();
     let prepared =
-        scale_roll(&first.appearance, &now_from_first, &input.pointing.left, settings, None).ok()?;
+        scale_roll(&first.appearance, &now_from_first, &input.pointing.left, settings, Preparation::Surface)
+            .ok()?;
     let size = settings.template_size_px;
     // One position more than the reach, so that a peak at its end has neighbours.
     let side = size + 2 * (settings.drift_reach_px.ceil() as u32 + 1);

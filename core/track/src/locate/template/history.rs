@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::memory::Appearance;
-use super::scale_roll::scale_roll;
+use super::scale_roll::{Preparation, scale_roll};
 use super::settings::TemplateSettings;
 use crate::trace::StepTrace;
 use sightline_geometry::frames::Pose;
@@ -57,7 +57,8 @@ pub fn against_earlier<'a>(
     let compare = |appearance: &Appearance| -> Option<AgainstEarlier> {
         let now_from_then = site_from_rover.inverse() * appearance.site_from_rover;
         let prepared =
-            scale_roll(appearance, &now_from_then, &recorded.point_mast.left, settings, None).ok()?;
+            scale_roll(appearance, &now_from_then, &recorded.point_mast.left, settings, Preparation::Surface)
+                .ok()?;
         let surface = zncc_surface(&prepared.rolled, image, region)?;
         let peak = find_peak(&surface, true)?;
         Some(AgainstEarlier {

@@ -37,16 +37,19 @@ use sightline_vision::image::patch::{self, Patch};
 use sightline_vision::image::sample::Kernel;
 use sightline_vision::image::{GrayImage, PixelRect};
 
-/// A template that was tried: one of several appearances, or one pair of a brute-force search.
+/// A template that was tried: one of several appearances, warped or not, or one pair of a brute-force search.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct TriedTemplate {
     /// The stop at which it was taken.
     pub template_step: usize,
+    /// Whether it was warped by the slope of the surface instead of scaled and rolled.
+    #[serde(default)]
+    pub warped: bool,
     /// Scale that was applied.
     pub scale: f64,
     /// Roll that was applied, rad.
     pub roll_rad: f64,
-    /// Its best score, of the measure.
+    /// Its score, by which it was chosen: in focus, or of the measure where there is no focus.
     pub score: f64,
 }
 
@@ -166,6 +169,27 @@ fn correlate(
     }
 }
 
+/// The score by which templates are compared: in focus, or of the measure where there is no focus.
+pub(super) fn fit(
+    prepared: &Prepared<'_>,
+    first: &FirstMatch,
+    image: &GrayImage,
+    settings: &TemplateSettings,
+) -> f64 {
+    let focus = focus_of(is_correlated(first, settings), settings);
+    refine(&focus, &prepared.rolled, image, &first.peak, settings)
+        .map_or(first.peak.score, |(_, score)| score)
+}
+
+fn is_correlated(first: &FirstMatch, settings: &TemplateSettings) -> bool {
+    first.descent.is_none() && settings.measure == Measure::Ncc
+}
+
+/// The weights in focus; even ones where the match is not one of correlation.
+fn focus_of(is_correlated: bool, settings: &TemplateSettings) -> Focus {
+    Focus::new(settings.template_size_px, if is_correlated { settings.focus_px } else { 0.0 })
+}
+
 /// The match that the first stage's begins: refined, scored, and with its error.
 pub fn finish(
     prepared: &Prepared<'_>,
@@ -176,10 +200,10 @@ pub fn finish(
     settings: &TemplateSettings,
 ) -> TemplateMatch {
     let (size, template) = (settings.template_size_px, &prepared.rolled);
+    let is_correlated = is_correlated(&first, settings);
+    let focus = focus_of(is_correlated, settings);
     let mut peak = first.peak;
     let second_peak = peak::second_peak(&first.surface, &peak, f64::from(size) / 2.0);
-    let is_correlated = first.descent.is_none() && settings.measure == Measure::Ncc;
-    let focus = Focus::new(size, if is_correlated { settings.focus_px } else { 0.0 });
     let focused = refine(&focus, template, image, &peak, settings);
     let correlated = Placed::at(focused.map_or(peak.pixel, |(pixel, _)| pixel));
     let start = first.descent.map_or(correlated, |(_, placed)| placed);

@@ -14,7 +14,8 @@
 //! F = ∂pixel_new/∂p · R · ∂p/∂pixel_old
 //! ```
 //! and with `surface_warp` the window is resampled through F instead: foreshortening changes with the line of
-//! sight, most on surfaces seen at a grazing angle. With `warp_model = homography` each pixel goes through the plane of the
+//! sight, most on surfaces seen at a grazing angle. Where the window covers two surfaces, as at the foot of a rock, the slope
+//! between them is that of neither; so both windows are matched, and the better match stands (`choose`). With `warp_model = homography` each pixel goes through the plane of the
 //! surface and both camera models instead (`window_map`). `image_from_template` is F (or s R(ρ) where the slope is not
 //! known), which also carries the uncertainty of the target's position in the image.
 //!
@@ -52,6 +53,22 @@ const STRETCH_LIMIT: f64 = 0.5;
 /// Magnified more, the default window shows a single pixel of its source; shrunk more, its source is larger than most
 /// images. Distances that differ so much come from wrong poses.
 const SCALE_MAX: f64 = 20.0;
+
+/// How the window of an appearance is prepared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Preparation {
+    /// Warped by the slope of the surface where `surface_warp` is on and stereo measured one; otherwise scaled and rolled.
+    Surface,
+    /// Scaled and rolled by the geometry, as far as the switches `scale` and `roll` say.
+    ScaleRoll,
+    /// Scaled and rolled by given amounts, without geometry and switches (R224).
+    Given {
+        /// Scale.
+        scale: f64,
+        /// Roll, rad, clockwise on screen.
+        roll_rad: f64,
+    },
+}
 
 /// The template, scaled and rolled, or warped by the target's surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -96,6 +113,14 @@ impl ScaleRoll {
             return self.image_from_template;
         }
         Rotation2::new(self.applied_roll_rad).into_inner() * self.applied_scale
+    }
+
+    /// How the template was prepared, to prepare it once more.
+    pub fn preparation(&self) -> Preparation {
+        match self.warped {
+            true => Preparation::Surface,
+            false => Preparation::Given { scale: self.applied_scale, roll_rad: self.applied_roll_rad },
+        }
     }
 
     /// By how much the surface stretches the prepared template further: `F (s R)⁻¹ − I`, px per px; 0 where it
@@ -144,8 +169,6 @@ pub fn geometry(
 
 /// Scales and rolls the template of `appearance` for the present left camera, or warps it by its surface.
 ///
-/// `tried` is a scale and a roll (rad) to take instead of what the geometry and the switches say (R224).
-///
 /// # Errors
 /// A sentence saying why there is no template.
 pub fn scale_roll<'a>(
@@ -153,7 +176,7 @@ pub fn scale_roll<'a>(
     now_from_template: &Pose,
     left: &'a Camera,
     settings: &TemplateSettings,
-    tried: Option<(f64, f64)>,
+    preparation: Preparation,
 ) -> Result<Prepared<'a>, TemplateFailure> {
     let (scale, roll_rad, old_distance_m, new_distance_m) = geometry(
         &appearance.position_in_rover,
@@ -162,8 +185,10 @@ pub fn scale_roll<'a>(
         left,
         settings.roll_reference,
     )?;
-    let by_geometry = (if settings.scale { scale } else { 1.0 }, if settings.roll { roll_rad } else { 0.0 });
-    let (applied_scale, applied_roll_rad) = tried.unwrap_or(by_geometry);
+    let (applied_scale, applied_roll_rad) = match preparation {
+        Preparation::Given { scale, roll_rad } => (scale, roll_rad),
+        _ => (if settings.scale { scale } else { 1.0 }, if settings.roll { roll_rad } else { 0.0 }),
+    };
     if !(1.0 / SCALE_MAX..=SCALE_MAX).contains(&applied_scale) {
         let (then_m, now_m) = (old_distance_m, new_distance_m);
         return Err(TemplateFailure::ScaleOutside { then_m, now_m, limit: SCALE_MAX });
@@ -176,7 +201,8 @@ pub fn scale_roll<'a>(
             .try_inverse()
             .is_some_and(|inverse| (map * inverse - Matrix2::identity()).norm() <= STRETCH_LIMIT)
     });
-    let is_wanted = settings.surface_warp && settings.scale && settings.roll && tried.is_none();
+    let is_wanted =
+        settings.surface_warp && settings.scale && settings.roll && preparation == Preparation::Surface;
     let warp = surface.filter(|_| is_wanted);
     let plane = warp
         .filter(|_| settings.warp_model == WarpModel::Homography)

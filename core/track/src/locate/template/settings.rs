@@ -32,8 +32,8 @@ settings_group! {
         scale: bool = true, "", Domain::Switch, "Kim09 §4.3.1";
         /// Roll the template by the camera geometry.
         roll: bool = true, "", Domain::Switch, "Kim09 §4.3.1";
-        /// Warps the template by the slope of the target's surface, measured by stereo, instead of scaling and rolling it;
-        /// needs scale and roll on.
+        /// Also tries the template warped by the slope of the target's surface, measured by stereo, and takes the better
+        /// match; off: scaled and rolled only. Needs scale and roll on.
         surface_warp: bool = true, "", Domain::Switch, "ours";
         /// Largest deviation from a plane of the neighbours on either side of the target, as a disparity; above it the
         /// slope is not used (depth edge or curved surface).
