@@ -153,10 +153,10 @@ fn a_brute_force_search_finds_scale_and_roll_without_the_geometry() {
 fn an_older_appearance_is_tried_and_its_drift_is_the_starts() {
     let changes = [("template_update", json!("every_update")), ("reference_templates", json!(3))];
     let steps = run(&PlaneWorld::new(approach()), &changes);
-    let tried: Vec<usize> = matched(&steps[4]).tried.iter().map(|t| t.template_step).collect();
-    assert_eq!(tried, [3, 2, 1]);
-    let best = matched(&steps[4]).tried.iter().map(|t| t.score).fold(-1.0, f64::max);
-    assert_eq!(best, matched(&steps[4]).peak.score);
+    let tried: Vec<_> = matched(&steps[4]).tried.iter().map(|t| (t.template_step, t.warped)).collect();
+    assert_eq!(tried, [(3, true), (3, false), (2, true), (2, false), (1, true), (1, false)]);
+    let best = matched(&steps[4]).tried.iter().filter_map(|t| t.focused_score).fold(-1.0, f64::max);
+    assert_eq!(matched(&steps[4]).focused_score, Some(best));
     // At stop 2 the designated window is among them; taken back to it, a match chains no other's error.
     let mut covered = PlaneWorld::new(approach());
     covered.true_poses[2] = covered.true_poses[1];

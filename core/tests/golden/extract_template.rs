@@ -131,6 +131,7 @@ fn tried(sheet: &mut Sheet, tried: &TriedTemplate) {
     sheet.put("scale", tried.scale);
     sheet.put("roll_rad", tried.roll_rad);
     sheet.put("score", tried.score);
+    sheet.put("focused_score", tried.focused_score);
 }
 
 fn weighed(sheet: &mut Sheet, weighed: &WeighedPeak) {

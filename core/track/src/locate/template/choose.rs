@@ -8,19 +8,22 @@
 //! * `transform = search`: for each of them every pair of a scale and a roll from a grid, without the geometry (R224).
 //!   Scales are spaced by a ratio and rolls by a step, both about none.
 //!
-//! Each is matched by the first stage, and the highest score wins, the first among equals: the score in focus, which counts
-//! the surroundings of the target most, or that of the measure where there is no focus. A match against an older appearance
-//! starts from that appearance's drift.
+//! Each is matched by the first stage, and the highest score of the measure wins, the first among equals. Of matches at the
+//! same place the one with the higher score in focus wins, where there is a focus: it counts the surroundings of the target
+//! most. A match against an older appearance starts from that appearance's drift.
 
 use super::failure::TemplateFailure;
 use super::first_match::FirstMatch;
-use super::match_template::{TriedTemplate, first_match, fit};
+use super::match_template::{TriedTemplate, first_match, focused_score};
 use super::memory::{Appearance, Kept, TemplateMemory};
 use super::scale_roll::{Preparation, Prepared, ScaleRoll, scale_roll};
 use super::settings::{TemplateSettings, Transform};
 use crate::locate::tracker::LocateInput;
 use sightline_geometry::estimate::drift::Drift;
 use sightline_geometry::frames::Pose;
+
+/// Matches whose peaks are at most so far apart, px, are of the same place.
+const SAME_PLACE_PX: f64 = 5.0;
 
 /// The template whose match stands.
 pub(super) struct Chosen<'a> {
@@ -66,7 +69,7 @@ pub(super) fn choose<'a>(
         .chain(older.map(|kept| (&kept.appearance, kept.drift, now_from_kept(input, memory, kept))))
         .collect();
     let preparations = preparations(settings);
-    let mut best: Option<(f64, Chosen<'a>)> = None;
+    let mut best: Option<(Option<f64>, Chosen<'a>)> = None;
     let mut unmatched: Option<Unmatched> = None;
     let (mut tried, mut comparisons) = (Vec::new(), 0);
     for (appearance, drift, now_from_template) in appearances {
@@ -89,12 +92,19 @@ pub(super) fn choose<'a>(
                 };
             is_warped = prepared.record.warped;
             comparisons += first.positions;
-            let score = fit(&prepared, &first, input.capture.pair.left.as_ref(), settings);
-            tried.push(describe(&prepared, score));
-            if best.as_ref().is_none_or(|(highest, _)| score > *highest) {
+            let focused = focused_score(&prepared, &first, input.capture.pair.left.as_ref(), settings);
+            tried.push(describe(&prepared, &first, focused));
+            let is_better = |(its_focused, best): &(Option<f64>, Chosen<'_>)| {
+                let is_same_place = first.peak.pixel.distance(best.first.peak.pixel) <= SAME_PLACE_PX;
+                match (focused, its_focused) {
+                    (Some(focused), Some(its_focused)) if is_same_place => focused > *its_focused,
+                    _ => first.peak.score > best.first.peak.score,
+                }
+            };
+            if best.as_ref().is_none_or(is_better) {
                 let (tried, comparisons) = (Vec::new(), 0);
                 let chosen = Chosen { prepared, now_from_template, first, drift, tried, comparisons };
-                best = Some((score, chosen));
+                best = Some((focused, chosen));
             }
         }
     }
@@ -125,13 +135,14 @@ fn attempt<'a>(
     }
 }
 
-fn describe(prepared: &Prepared<'_>, score: f64) -> TriedTemplate {
+fn describe(prepared: &Prepared<'_>, first: &FirstMatch, focused_score: Option<f64>) -> TriedTemplate {
     TriedTemplate {
         template_step: prepared.record.template_step,
         warped: prepared.record.warped,
         scale: prepared.record.applied_scale,
         roll_rad: prepared.record.applied_roll_rad,
-        score,
+        score: first.peak.score,
+        focused_score,
     }
 }
 

@@ -49,8 +49,11 @@ pub struct TriedTemplate {
     pub scale: f64,
     /// Roll that was applied, rad.
     pub roll_rad: f64,
-    /// Its score, by which it was chosen: in focus, or of the measure where there is no focus.
+    /// Its best score, of the measure.
     pub score: f64,
+    /// The score in focus there; null where there is no focus.
+    #[serde(default)]
+    pub focused_score: Option<f64>,
 }
 
 /// The match of the template in the left image.
@@ -169,16 +172,16 @@ fn correlate(
     }
 }
 
-/// The score by which templates are compared: in focus, or of the measure where there is no focus.
-pub(super) fn fit(
+/// The score in focus at the first stage's match; `None` where there is no focus.
+pub(super) fn focused_score(
     prepared: &Prepared<'_>,
     first: &FirstMatch,
     image: &GrayImage,
     settings: &TemplateSettings,
-) -> f64 {
+) -> Option<f64> {
     let focus = focus_of(is_correlated(first, settings), settings);
-    refine(&focus, &prepared.rolled, image, &first.peak, settings)
-        .map_or(first.peak.score, |(_, score)| score)
+    let (_, score) = refine(&focus, &prepared.rolled, image, &first.peak, settings)?;
+    Some(score)
 }
 
 fn is_correlated(first: &FirstMatch, settings: &TemplateSettings) -> bool {
