@@ -195,7 +195,8 @@ fn a_match_far_from_the_prediction_must_score_more() {
     let reason = |steps: &[RunStep]| steps[2].row().reason.unwrap_or_default();
     let believed = run(&world, &[]);
     assert_eq!(believed[2].update.state, TrackingState::Tracking, "{}", reason(&believed));
-    let doubted = run(&world, &[("far_ncc_min", json!(1.0))]);
+    // The plane is without noise: scaled and rolled, its window would score 1.
+    let doubted = run(&world, &[("far_ncc_min", json!(1.0)), ("scale", json!(false))]);
     assert!(
         doubted[2].update.state.is_lost() && reason(&doubted).contains("far_ncc"),
         "{}",

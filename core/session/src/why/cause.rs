@@ -154,6 +154,15 @@ fn of_match(book: &Book<'_>, verdict: &Verdict) -> Option<Cause> {
             number(gate.value?)
         )));
     }
+    if let Some(gate) = failed("far_ncc") {
+        let px = matched.pixel.distance(book.trace.point_mast.predicted_left?);
+        return Some(Cause::slip(format!(
+            "The match is {px:.0} px from the prediction, where a score of {} is required, and has {}: the pose estimate is off \
+             (slip), or a similar place was matched",
+            number(gate.limit),
+            number(gate.value?)
+        )));
+    }
     let second = matched.second_peak.as_ref().filter(|_| failed("second_peak_ratio").is_some());
     let second = second.map(|second| {
         Cause::new(format!(

@@ -47,7 +47,11 @@ fn the_cause_of_a_loss_in_a_simulated_drive_is_its_trouble() {
         ),
         ("occlusion", 5, "The match score fell from 0.99"),
         ("self-shadow", 15, "The match score fell from 0.97"),
-        ("stuck", 6, "The match is good, but 0.8"),
+        (
+            "stuck",
+            5,
+            "The match is 17 px from the prediction, where a score of 0.850 is required, and has 0.849",
+        ),
     ] {
         let (step, summary) = first_loss(name, trouble_at, &[]).expect(name);
         assert_eq!(step, trouble_at, "{name}: {summary:?}");

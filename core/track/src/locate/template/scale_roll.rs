@@ -14,10 +14,11 @@
 //! F = ∂pixel_new/∂p · R · ∂p/∂pixel_old
 //! ```
 //! and with `surface_warp` the window is resampled through F instead: foreshortening changes with the line of
-//! sight, most on surfaces seen at a grazing angle. Where the window covers two surfaces, as at the foot of a rock, the slope
-//! between them is that of neither; so both windows are matched, and the better match stands (`choose`). With `warp_model = homography` each pixel goes through the plane of the
-//! surface and both camera models instead (`window_map`). `image_from_template` is F (or s R(ρ) where the slope is not
-//! known), which also carries the uncertainty of the target's position in the image.
+//! sight, most on surfaces seen at a grazing angle. Where the window covers two surfaces, as at the foot of a rock, the
+//! slope between them is that of neither; so both windows are matched, and the better match stands (`choose`). With
+//! `warp_model = homography` each pixel goes through the plane of the surface and both camera models instead
+//! (`window_map`). `image_from_template` is F (or s R(ρ) where the slope is not known, or the window without it matches
+//! better), which also carries the uncertainty of the target's position in the image.
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
@@ -59,7 +60,7 @@ const SCALE_MAX: f64 = 20.0;
 pub enum Preparation {
     /// Warped by the slope of the surface where `surface_warp` is on and stereo measured one; otherwise scaled and rolled.
     Surface,
-    /// Scaled and rolled by the geometry, as far as the switches `scale` and `roll` say.
+    /// Scaled and rolled by the geometry, without the slope of the surface.
     ScaleRoll,
     /// Scaled and rolled by given amounts, without geometry and switches (R224).
     Given {
@@ -139,6 +140,12 @@ fn surface_map(appearance: &Appearance, now_from_template: &Pose, left: &Camera)
     Some(jacobian * now_from_template.rotation.to_rotation_matrix().matrix() * slope)
 }
 
+/// Whether a surface map stretches the template beside scale and roll no more than is believed.
+fn is_believed(map: &Matrix2<f64>, similarity: &Matrix2<f64>) -> bool {
+    let inverse = similarity.try_inverse();
+    inverse.is_some_and(|inverse| (map * inverse - Matrix2::identity()).norm() <= STRETCH_LIMIT)
+}
+
 /// The scale and roll of the geometry alone: `(s, ρ in rad, D_old in m, D_new in m)`.
 ///
 /// # Errors
@@ -196,11 +203,9 @@ pub fn scale_roll<'a>(
     let (image, pixel) = (appearance.image.as_ref(), appearance.pixel);
     let (size, kernel) = (settings.template_size_px, settings.kernel);
     let similarity = Rotation2::new(roll_rad).into_inner() * scale;
-    let surface = surface_map(appearance, now_from_template, left).filter(|map| {
-        similarity
-            .try_inverse()
-            .is_some_and(|inverse| (map * inverse - Matrix2::identity()).norm() <= STRETCH_LIMIT)
-    });
+    // Where the window that is only scaled and rolled matches better, it is the better map too.
+    let surface = surface_map(appearance, now_from_template, left)
+        .filter(|map| preparation != Preparation::ScaleRoll && is_believed(map, &similarity));
     let is_wanted =
         settings.surface_warp && settings.scale && settings.roll && preparation == Preparation::Surface;
     let warp = surface.filter(|_| is_wanted);
