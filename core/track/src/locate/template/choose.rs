@@ -4,7 +4,7 @@
 //!   way apart, so that these differ in distance and in the line of sight.
 //! * `surface_warp`: each of them warped by the slope of its surface, and scaled and rolled by the geometry. Where the
 //!   window covers two surfaces, such as a rock and the ground before it, the measured slope is that of neither, and the
-//!   warped window matches beside the target; at 10 m by half a pixel, which every renewal of the template adds up.
+//!   warped window matches beside the target, an error that every renewal of the template adds up.
 //! * `transform = search`: for each of them every pair of a scale and a roll from a grid, without the geometry (R224).
 //!   Scales are spaced by a ratio and rolls by a step, both about none.
 //!
