@@ -52,7 +52,8 @@ fn scene() -> &'static Scene {
         let mut scenario = library::scenario("approach-10").expect("a scenario of the library");
         let name: CameraName = "front_hazcam".parse().expect("a name");
         (scenario.camera.image_size, scenario.camera.samples_per_axis) = (256, 2);
-        scenario.camera.further = vec![FurtherRig { name, rig: CameraRig::MerFrontHazcam, image_size: 256 }];
+        scenario.camera.further =
+            vec![FurtherRig { name, rig: CameraRig::MerFrontHazcam, look_deg: None, image_size: 256 }];
         let folder = tempfile::tempdir().expect("a folder for the drive");
         let world = DrivenTraverse::begin(&scenario, &folder.path().join("drive"), Cancel::default())
             .expect("a drive");

@@ -24,7 +24,8 @@ fn name(text: &str) -> CameraName {
 /// The small drive with pancams, which stop 2 lacks, and hazcams, of which stop 1 has the left one alone; nothing is rendered.
 fn drive(folder: &Path) -> Traverse {
     let mut scenario = small_scenario();
-    let further = |text: &str, rig, image_size| FurtherRig { name: name(text), rig, image_size };
+    let further =
+        |text: &str, rig, image_size| FurtherRig { name: name(text), rig, look_deg: None, image_size };
     scenario.camera.further = vec![
         further("front_hazcam", CameraRig::MerFrontHazcam, 128),
         further("pancam", CameraRig::MerPancam, 512),

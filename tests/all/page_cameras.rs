@@ -9,7 +9,8 @@ use sightline_world::{Eye, Scenario, World, choose_targets, index, surface_point
 
 fn scenario() -> Scenario {
     let mut scenario = short_approach();
-    let further = |name: &str, rig| FurtherRig { name: name.parse().unwrap(), rig, image_size: 512 };
+    let further =
+        |name: &str, rig| FurtherRig { name: name.parse().unwrap(), rig, look_deg: None, image_size: 512 };
     scenario.camera.further =
         vec![further("front_hazcam", CameraRig::MerFrontHazcam), further("pancam", CameraRig::MerPancam)];
     scenario

@@ -180,6 +180,7 @@ fn scenario(number: u32, images: Images) -> Result<Scenario> {
     scenario.camera.further.push(FurtherRig {
         name: "front_hazcam".parse().map_err(Error::Request)?,
         rig: CameraRig::MerFrontHazcam,
+        look_deg: None,
         image_size: if number == 4 { images.size.min(1024) } else { 256 },
     });
     // The planned drive is not driven: the first stop alone is used.

@@ -27,7 +27,7 @@ fn name(text: &str) -> CameraName {
 }
 
 fn further(text: &str, rig: CameraRig, image_size: u32) -> FurtherRig {
-    FurtherRig { name: name(text), rig, image_size }
+    FurtherRig { name: name(text), rig, look_deg: None, image_size }
 }
 
 /// A short approach with a pair of hazcams and one of pancams beside the navcams.

@@ -4,8 +4,9 @@
 //! follow from them) and, apart from it, the truth. The true cameras stand in the truth only where they
 //! differ from the ones that the tracker is given, which is when the scenario has a pointing error.
 //!
-//! `camera.further` adds cameras to every stop: their images are rendered from the same poses, those on the mast at the angles
-//! to which the mast is pointed for the main pair (level and ahead where that is on the body).
+//! `camera.further` adds cameras to every stop: their images are rendered from the same poses, those on the mast at the angles of
+//! their `look_deg`, or else of the main pair (level and ahead where that is on the body). The head is turned as much elsewhere for
+//! them as for the main pair.
 //!
 //! With `camera.hand_over` one more stop follows the last: the same poses, true and estimated, and the other pair of
 //! cameras, which is fixed to the body and therefore has no mast angles (R205, R209).
@@ -24,7 +25,7 @@ use sightline_geometry::stereo_geometry::StereoGeometry;
 use crate::camera::picture::Eye;
 use crate::camera::rig::Rig;
 use crate::rover::{drive, mast_error, odometry};
-use crate::scenario::{CameraRig, CameraSettings, Course, Scenario};
+use crate::scenario::{CameraRig, CameraSettings, Course, FurtherRig, Scenario};
 use crate::world::World;
 
 /// The name of the scenario's file within a traverse folder.
@@ -86,16 +87,41 @@ pub fn index_until(scenario: &Scenario, world: &World, cancel: Cancel<'_>) -> Re
 /// The pairs of cameras of a scenario.
 pub(crate) struct Rigs {
     main: Rig,
-    further: Vec<(CameraName, Rig)>,
+    further: Vec<FurtherPair>,
+}
+
+/// A further pair: where its rig is mounted, and the angles to which the mast is turned for it, if not those of the main pair.
+struct FurtherPair {
+    name: CameraName,
+    rig: Rig,
+    look: Option<MastAngles>,
+}
+
+impl FurtherPair {
+    fn new(camera: &FurtherRig) -> Self {
+        let look = camera.look_deg.map(|look_deg| {
+            let [azimuth_rad, elevation_rad] = look_deg.map(f64::to_radians);
+            MastAngles { azimuth_rad, elevation_rad }
+        });
+        Self { name: camera.name, rig: Rig::of(camera.rig, camera.image_size), look }
+    }
+
+    /// The told and the true angles for this pair, from those for the main pair.
+    fn angles(&self, [told, pointed]: [Option<MastAngles>; 2]) -> [Option<MastAngles>; 2] {
+        let Some(look) = self.look else { return [told, pointed] };
+        let from = told.unwrap_or(AHEAD);
+        let off = |pointed: MastAngles| MastAngles {
+            azimuth_rad: look.azimuth_rad + pointed.azimuth_rad - from.azimuth_rad,
+            elevation_rad: look.elevation_rad + pointed.elevation_rad - from.elevation_rad,
+        };
+        [Some(look), pointed.map(off)]
+    }
 }
 
 impl Rigs {
     pub(crate) fn new(settings: &CameraSettings) -> Self {
-        let further = settings.further.iter();
-        Self {
-            main: Rig::new(settings),
-            further: further.map(|camera| (camera.name, Rig::of(camera.rig, camera.image_size))).collect(),
-        }
+        let further = settings.further.iter().map(FurtherPair::new).collect();
+        Self { main: Rig::new(settings), further }
     }
 }
 
@@ -111,7 +137,8 @@ pub(crate) fn simulated_stop(
 ) -> Stop {
     let (left, right) = rigs.main.cameras_in_rover(told);
     let (left_camera, right_camera) = true_cameras(&rigs.main, pointed);
-    let further = |(name, rig): &(CameraName, Rig)| further_camera(number, *name, rig, [told, pointed]);
+    let further =
+        |pair: &FurtherPair| further_camera(number, pair.name, &pair.rig, pair.angles([told, pointed]));
     let [truth, estimate] = poses.map(|pose| PoseRecord::from(&pose));
     Stop {
         time_s,
@@ -201,9 +228,8 @@ fn handed_over(last: &Stop, number: usize, settings: &CameraSettings) -> Option<
 /// A stop at which the further pair of this name, fixed to the body, takes over from the main one; the stop as it is without such a
 /// pair.
 pub(crate) fn seen_by_body(stop: Stop, number: usize, name: CameraName, rigs: &Rigs) -> Stop {
-    let Some((_, rig @ Rig::Body { .. })) = rigs.further.iter().find(|(known, _)| *known == name) else {
-        return stop;
-    };
+    let pair = rigs.further.iter().find(|pair| pair.name == name);
+    let Some(FurtherPair { rig: rig @ Rig::Body { .. }, .. }) = pair else { return stop };
     let (left, right) = rig.cameras_in_rover(None);
     let truth = stop.truth.map(|truth| StopTruth { left_camera: None, right_camera: None, ..truth });
     let (left, right) = (view("left", number, left), view("right", number, right));

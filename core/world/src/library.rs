@@ -13,6 +13,7 @@ use sightline_geometry::error::{Error, Result};
 const FILES: &[(&str, &str)] = &[
     ("approach-10", include_str!("library/approach-10.toml")),
     ("obstacles-10", include_str!("library/obstacles-10.toml")),
+    ("navcam-wedges", include_str!("library/navcam-wedges.toml")),
     ("no-safe-path", include_str!("library/no-safe-path.toml")),
     ("false-obstacle", include_str!("library/false-obstacle.toml")),
     ("approach-5", include_str!("library/approach-5.toml")),

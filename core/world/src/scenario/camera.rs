@@ -44,13 +44,16 @@ impl CameraRig {
 }
 
 /// A pair of cameras beside the main one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FurtherRig {
     /// Its name at every stop.
     pub name: CameraName,
-    /// Which pair of cameras; one on the mast points as the mast does for the main pair.
+    /// Which pair of cameras.
     pub rig: CameraRig,
+    /// Azimuth (to the right) and elevation (up), deg, to which the mast is turned for this pair; by default those of the main pair.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub look_deg: Option<[f64; 2]>,
     /// Width of its images, px: 1024, 512, 256 or 128.
     #[serde(default = "full_size")]
     pub image_size: u32,
@@ -269,6 +272,15 @@ impl CameraSettings {
             if camera.name == CameraName::ODOMETRY {
                 let problem = format!("{} is the pair that visual odometry takes of its own", camera.name);
                 return Err(Error::setting(key("name"), problem));
+            }
+            if let Some([azimuth_deg, elevation_deg]) = camera.look_deg {
+                if camera.rig.is_on_body() {
+                    let problem =
+                        "a pair on the body cannot be turned: leave it out, or choose a rig on the mast";
+                    return Err(Error::setting(key("look_deg"), problem));
+                }
+                within(&key("look_deg[0]"), azimuth_deg, -180.0, 180.0)?;
+                within(&key("look_deg[1]"), elevation_deg, -90.0, 90.0)?;
             }
             if self.further[..index].iter().any(|other| other.name == camera.name) {
                 let problem = format!("{} is the name of another camera already", camera.name);
