@@ -193,6 +193,7 @@ fn stereo(bencher: Bencher<'_, '_>) {
             right: &plane.cameras[1],
             geometry: StereoGeometry::Lateral,
             predicted_range_m: Some(5.1),
+            surface_by_pixel: None,
         };
         point_stereo::point_stereo(&input, &settings)
     });

@@ -121,6 +121,7 @@ impl PointRanges {
                     right,
                     geometry: StereoGeometry::Convergent,
                     predicted_range_m: None,
+                    surface_by_pixel: None,
                 };
                 match grid.largest_disparity_px([x, y], 2 * stride) {
                     None if stride == 1 => Err(grid.coarser_outcome([x, y])),

@@ -86,6 +86,7 @@ pub(super) fn choose<'a>(
                 match attempt(appearance, &now_from_template, preparation, input, settings) {
                     Ok(matched) => matched,
                     Err(missing) => {
+                        is_warped = missing.scale_roll.as_ref().is_some_and(|record| record.warped);
                         unmatched.get_or_insert(missing);
                         continue;
                     }

@@ -39,12 +39,13 @@ pub use settings::TemplateSettings;
 
 use std::sync::Arc;
 
-use nalgebra::Matrix2;
+use nalgebra::{Matrix2, Matrix3x2};
 
 use self::choose::Chosen;
 use self::failure::TemplateFailure;
 use self::memory::{Appearance, Replaced, TemplateMemory};
 use self::point_stereo::StereoInput;
+use self::scale_roll::carried_surface;
 use self::settings::{NoiseModel, TemplateUpdate};
 use self::triangulate::HALF_PIXEL_VARIANCE;
 use super::tracker::{Accepted, DesignateInput, GateInput, LocateInput, Sighting, Tracker};
@@ -96,10 +97,11 @@ impl Tracker for TemplateTracker {
                 return Sighting::nothing(unmatched.missing, evidence);
             }
         };
-        let image = input.capture.pair.left.as_ref();
+        let (image, left) = (input.capture.pair.left.as_ref(), &input.pointing.left);
         let Chosen { prepared, now_from_template, mut first, drift, tried, comparisons } = chosen;
+        let surface = carried_surface(prepared.appearance(), &now_from_template, left);
         if let Some(relief) = prepared.appearance().relief.as_ref().filter(|_| settings.height_weight > 0.0) {
-            let stereo = stereo_input(input, first.peak.pixel);
+            let stereo = stereo_input(input, first.peak.pixel, surface);
             first.weighed = height::weigh(&mut first, relief, &now_from_template, &stereo, settings);
         }
         let matched = match_template::finish(&prepared, first, tried, comparisons, image, settings);
@@ -124,7 +126,7 @@ impl Tracker for TemplateTracker {
         if settings.noise_model == NoiseModel::HalfPixel {
             error = Drift::of_pixel(Matrix2::identity() * HALF_PIXEL_VARIANCE);
         }
-        let stereo = stereo_input(input, left_pixel);
+        let stereo = stereo_input(input, left_pixel, surface);
         finish(evidence, &stereo, error, settings)
     }
 
@@ -189,6 +191,7 @@ fn designate(input: &DesignateInput<'_>) -> Sighting<TemplateEvidence> {
         right: input.right,
         geometry: input.stereo,
         predicted_range_m: None,
+        surface_by_pixel: None,
     };
     let mut found = finish(TemplateEvidence::default(), &stereo, Drift::of_pixel(covariance), settings);
     let evidence = &mut found.evidence;
@@ -199,7 +202,11 @@ fn designate(input: &DesignateInput<'_>) -> Sighting<TemplateEvidence> {
 }
 
 /// What point stereo is given at a later stop.
-fn stereo_input<'a>(input: &LocateInput<'a>, left_pixel: Pixel) -> StereoInput<'a> {
+fn stereo_input<'a>(
+    input: &LocateInput<'a>,
+    left_pixel: Pixel,
+    surface_by_pixel: Option<Matrix3x2<f64>>,
+) -> StereoInput<'a> {
     let left = &input.pointing.left;
     StereoInput {
         left_pixel,
@@ -209,6 +216,7 @@ fn stereo_input<'a>(input: &LocateInput<'a>, left_pixel: Pixel) -> StereoInput<'
         right: &input.pointing.right,
         geometry: input.stereo,
         predicted_range_m: Some((input.prediction.position_in_rover - left.model.centre()).norm()),
+        surface_by_pixel,
     }
 }
 

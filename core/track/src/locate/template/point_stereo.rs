@@ -13,7 +13,8 @@
 //! views are free. The slope of the surface (how the right position moves when the left one does) comes from
 //! the same search at four neighbours: it turns an error of the left pixel into one of range, and with
 //! `surface_warp` the windows near the best position are compared once more, resampled as on that surface; the
-//! better score stands. `stereo_search` says how the windows are compared.
+//! better score stands. Where the neighbours say nothing, as on a narrow face, the slope is that of an earlier stop, carried by the
+//! poses. `stereo_search` says how the windows are compared.
 //!
 //! **Left–right check.** The right pixel is looked for in the left image in the same way, with the eyes exchanged and
 //! the surface seen from the other side. How far from the first pixel it leads is recorded: a wrong match seldom
@@ -86,7 +87,7 @@ pub struct PointStereo {
 }
 
 /// A slope that stretches the window by more than this is not believed, px per px.
-const STRETCH_LIMIT: f64 = 0.5;
+const STRETCH_LIMIT: f64 = 1.0;
 
 /// Finds the left pixel's point in the right image.
 ///
@@ -112,14 +113,15 @@ pub fn point_stereo(
     };
     let (points, best) = facing.search(interval);
     let best = best.map(|best| facing.in_focus(interval, best)).ok_or(TemplateFailure::NoStereoWindow)?;
-    let slope = surface_slope(&curve, best.along, input, &focus, settings);
+    let measured = surface_slope(&curve, best.along, input, &focus, settings);
+    let slope = measured.or_else(|| carried_slope(&curve, best.along, input));
     let (windows, best) = on_surface(facing, interval, best, slope);
     let (right_pixel, range_m) = curve.at(best.along, best.across);
     let prepared = windows.right_from_left(best.along);
     let right_window =
         resample::window(input.right_image, right_pixel, &prepared, half, settings.kernel).into();
     let right_from_left =
-        slope.map_or(prepared, |slope| Windows { slope, ..facing }.right_from_left(best.along));
+        measured.map_or(prepared, |slope| Windows { slope, ..facing }.right_from_left(best.along));
     let misfit = prepared
         .try_inverse()
         .map_or_else(Matrix2::zeros, |inverse| inverse * right_from_left - Matrix2::identity());
@@ -245,6 +247,15 @@ fn surface_slope(
     let du = slope(neighbour(-SLOPE_BASE_PX, 0.0), neighbour(SLOPE_BASE_PX, 0.0))?;
     let dv = slope(neighbour(0.0, -SLOPE_BASE_PX), neighbour(0.0, SLOPE_BASE_PX))?;
     Some(RowVector2::new(du, dv))
+}
+
+/// The same from the surface of an earlier stop.
+fn carried_slope(curve: &Curve, along: f64, input: &StereoInput<'_>) -> Option<RowVector2<f64>> {
+    let (_, range_m) = curve.at(along, 0.0);
+    let point = input.left.ray(input.left_pixel)?.at(range_m);
+    let (_, right_by_point) = input.right.model.project_with_jacobian(&point)?;
+    let beside = right_by_point * input.surface_by_pixel? - curve.right_from_left(input.right, range_m);
+    Some(curve.tangent(along).transpose() * beside)
 }
 
 /// A point of the right image and the surface there.

@@ -29,7 +29,7 @@
 //! | R | rotation of `now_from_template` | – |
 //! | ∂p/∂pixel_old | `appearance.surface_by_pixel` | m/px |
 
-use nalgebra::{Matrix2, Rotation2};
+use nalgebra::{Matrix2, Matrix3x2, Rotation2};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -138,6 +138,18 @@ fn surface_map(appearance: &Appearance, now_from_template: &Pose, left: &Camera)
     let (_, jacobian) =
         left.model.project_with_jacobian(&(now_from_template * appearance.position_in_rover))?;
     Some(jacobian * now_from_template.rotation.to_rotation_matrix().matrix() * slope)
+}
+
+/// How the surface point moves with the present left pixel, as it was measured when the template was taken: `R · ∂p/∂pixel_old · F⁻¹`,
+/// present rover frame, m per px.
+pub(super) fn carried_surface(
+    appearance: &Appearance,
+    now_from_template: &Pose,
+    left: &Camera,
+) -> Option<Matrix3x2<f64>> {
+    let old_from_new = surface_map(appearance, now_from_template, left)?.try_inverse()?;
+    let rotation = now_from_template.rotation.to_rotation_matrix();
+    Some(rotation.matrix() * appearance.surface_by_pixel? * old_from_new)
 }
 
 /// Whether a surface map stretches the template beside scale and roll no more than is believed.

@@ -1,5 +1,6 @@
 //! The input of point stereo and the points of its search, shared by the step and by its search.
 
+use nalgebra::Matrix3x2;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -25,6 +26,8 @@ pub struct StereoInput<'a> {
     pub geometry: StereoGeometry,
     /// Predicted distance from the left camera, m; null at designation.
     pub predicted_range_m: Option<f64>,
+    /// How the surface point moves with the left pixel, as an earlier stop measured it, rover frame, m per px; `None` where it did not.
+    pub surface_by_pixel: Option<Matrix3x2<f64>>,
 }
 
 /// One candidate on the epipolar curve.

@@ -137,7 +137,7 @@ pub(super) fn answer(input: &StereoInput<'_>, settings: &TemplateSettings) -> Op
     let mut best = facing.in_focus(interval, best?);
     let slope = slope(&curve, best.along, input, settings);
     let mut windows = facing;
-    if let Some(slope) = slope.filter(|slope| slope.norm() <= 0.5 && !best.at_end) {
+    if let Some(slope) = slope.filter(|slope| slope.norm() <= 1.0 && !best.at_end) {
         let on_surface = Direct { slope, ..facing };
         let near = ((best.along - 5.0).max(interval.0), (best.along + 5.0).min(interval.1));
         let again = on_surface.search(near).1;
