@@ -71,7 +71,7 @@ impl StoppedDrive<'_> {
         Some(Found { cause: StopCause::FalseObstacle, sentence, evidence: vec![where_is, what] })
     }
 
-    /// Ground beyond a limit under every path, or under every arc of a rover that turns to and fro.
+    /// Ground beyond a limit under every path, or under every arc ahead of a rover that turns to and fro.
     pub(super) fn no_safe_path(&self) -> Option<Found> {
         let turns = self.stops_without_arc()?;
         let choice = self.choice().or_else(|| self.round()?.last()?.choice.as_ref())?;
@@ -82,7 +82,9 @@ impl StoppedDrive<'_> {
         let (term, vetoes) = by_term.iter().max_by_key(|(_, vetoes)| vetoes.len())?;
         let turns = (!turns.is_empty()).then(|| {
             let stops = listed("stop", &turns);
-            format!("The rover only turns to and fro ({stops}): at none of these stops an arc is safe.")
+            format!(
+                "The rover only turns and backs up ({stops}): at none of these stops an arc ahead is safe."
+            )
         });
         let others: Vec<String> = by_term
             .iter()
@@ -101,7 +103,7 @@ impl StoppedDrive<'_> {
         Some(Found { cause: StopCause::NoSafePath, sentence, evidence })
     }
 
-    /// The stops between which a rover without a safe arc turned to and fro: none if it stays. `None` if it has a safe arc, or ended for
+    /// The stops between which a rover without a safe arc ahead turned to and fro: none if it stays. `None` if it has one, or ended for
     /// another reason.
     fn stops_without_arc(&self) -> Option<Vec<usize>> {
         match self.reason()? {
@@ -152,10 +154,10 @@ fn nearest(vetoes: &[Veto]) -> Option<String> {
     ))
 }
 
-/// Whether every arc of a decision is vetoed.
+/// Whether every arc ahead is vetoed.
 pub(super) fn has_no_arc(choice: &PathChoice) -> bool {
-    let mut arcs =
-        choice.candidates.iter().filter(|candidate| matches!(candidate.motion, Motion::Arc { .. }));
+    let is_ahead = |motion: &Motion| matches!(*motion, Motion::Arc { length_m, .. } if length_m > 0.0);
+    let mut arcs = choice.candidates.iter().filter(|candidate| is_ahead(&candidate.motion));
     arcs.all(|candidate| candidate.veto.is_some())
 }
 
