@@ -84,8 +84,10 @@ pub struct Drives<'a> {
     pub settings: &'a Settings,
     /// Whether the rocks on the rover's way remain.
     pub obstacles: bool,
-    /// A folder for images, which are removed again.
+    /// A folder for the drives.
     pub folder: &'a Path,
+    /// Whether they are kept, each with its images, as sessions can open them.
+    pub keeps: bool,
 }
 
 impl Drives<'_> {
@@ -95,8 +97,10 @@ impl Drives<'_> {
             let word = if self.command.goal == GoalRule::Fixed { "fixed" } else { "follows" };
             let folder = self.folder.join(format!("{word}-{seed}"));
             let outcome = self.drive(&scenario_of(self.from, seed), &folder);
-            // The images of a hundred drives would fill a disk.
-            let _ = std::fs::remove_dir_all(&folder);
+            if !self.keeps {
+                // The images of a hundred drives would fill a disk.
+                let _ = std::fs::remove_dir_all(&folder);
+            }
             tell();
             match outcome {
                 Ok((summary, way_m)) => Drive { seed, summary: Some(summary), problem: None, way_m },
@@ -146,7 +150,7 @@ impl Drives<'_> {
         let target = target_in_site(open, designation)?;
         let start = TruthSource::true_site_from_rover(open.traverse(), 0).unwrap_or_default();
         let start_m = [start.translation.x, start.translation.y];
-        let goal_m = goal_position_m(self.command, &target, start_m);
+        let goal_m = goal_position_m(self.command, 0, &target, start_m);
         let centre = open.traverse().world().map(World::targets_centre).unwrap_or_default();
         let mut cleared = scenario.clone();
         cleared.rocks.clear_path = Some(ClearPath {

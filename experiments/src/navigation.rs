@@ -106,7 +106,7 @@ impl Drives<'_> {
         let hazcam = hazcam.ok_or_else(|| missing("hazcams"))?.left.clone();
         let first = begun.state().first().cloned().ok_or_else(|| missing("stop"))?;
         let start = first.true_site_from_rover.to_pose();
-        let goal_m = goal_position_m(self.command, &target, [start.translation.x, start.translation.y]);
+        let goal_m = goal_position_m(self.command, 0, &target, [start.translation.x, start.translation.y]);
         let way_m = true_way_m(world, &start, goal_m, (self.hazards, self.navigator));
         let rover = Rover { of: self, world, scenario, hazcam, goal_m };
         let driven = rover.drive(first)?;

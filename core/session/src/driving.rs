@@ -17,7 +17,7 @@ use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Vector3;
 use sightline_recordings::{DrivenTraverse, Followed, Traverse};
 use sightline_rover::driving::executive::{self, CycleInput};
-use sightline_rover::driving::map_hazards::{body_pair, hazard_camera};
+use sightline_rover::driving::map_hazards::{body_pair, hazard_cameras};
 use sightline_rover::driving::set_goal::goal_position_m;
 use sightline_rover::driving::{ArrivalAction, Cycle, DriveCommand, HazardMaps, StopReason};
 use sightline_track::trace::StepTrace;
@@ -126,7 +126,7 @@ pub struct DriveSummary {
 pub(crate) fn check_command(traverse: &Traverse, command: &DriveCommand, first: &StepTrace) -> Result<()> {
     let target = &first.update.target;
     command.validate_for(&target.position_in_rover)?;
-    hazard_camera(traverse, first.step, command)?;
+    hazard_cameras(traverse, first.step, command)?;
     if command.on_arrival.contains(&ArrivalAction::HandOff) {
         body_pair(traverse, first.step, command)?;
     }
@@ -145,7 +145,7 @@ pub(crate) fn check_command(traverse: &Traverse, command: &DriveCommand, first: 
         return Err(Error::setting("tilt_max_deg", problem));
     }
     let start = pose.translation.vector;
-    let goal_m = goal_position_m(command, &target_in_site, [start.x, start.y]);
+    let goal_m = goal_position_m(command, 0, &target_in_site, [start.x, start.y]);
     let Some(ground_m) = traverse.world().map(World::ground_extent_m) else { return Ok(()) };
     if (0..2).all(|axis| (ground_m[axis][0]..=ground_m[axis][1]).contains(&goal_m[axis])) {
         return Ok(());
@@ -230,7 +230,7 @@ pub fn summary(
         arrived: ending.is_some_and(|ending| ending.reason == StopReason::Arrived),
         reason: ending.map(|ending| ending.reason),
         target_error_m: truth.map(|truth| truth.err_m),
-        goal_error_m: goal_error_m(world, command, steps),
+        goal_error_m: goal_error_m(world, command, steps, cycles.last()),
         driven_m: cycles.iter().filter_map(|cycle| cycle.report).map(|report| report.wheels_m).sum(),
         collisions: world.collisions(),
         tracked: truth.and_then(|truth| truth.tracked),
@@ -238,14 +238,20 @@ pub fn summary(
     }
 }
 
-fn goal_error_m(world: &DrivenTraverse, command: &DriveCommand, steps: &[Arc<RunStep>]) -> Option<f64> {
+fn goal_error_m(
+    world: &DrivenTraverse,
+    command: &DriveCommand,
+    steps: &[Arc<RunStep>],
+    decided: Option<&Cycle>,
+) -> Option<f64> {
     let (first, last) = (steps.first()?, steps.last()?);
     let traverse = world.traverse();
     let target = &first.update.target;
     let truth = TargetTruth::new(traverse, target.designation, Some(&target.position_in_rover))?;
     let since = command.since.unwrap_or(first.step);
     let start = TruthSource::true_site_from_rover(traverse, since)?.translation.vector;
-    let goal_m = goal_position_m(command, &truth.position_in_site(), [start.x, start.y]);
+    let actions = decided.map_or(0, |cycle| cycle.arrival_actions);
+    let goal_m = goal_position_m(command, actions, &truth.position_in_site(), [start.x, start.y]);
     let rover = TruthSource::true_site_from_rover(traverse, last.step)?.translation.vector;
     Some((rover.x - goal_m[0]).hypot(rover.y - goal_m[1]))
 }

@@ -37,7 +37,7 @@ pub fn way_to_goal_m(
     let traverse = begun.traverse();
     let target = TargetTruth::new(traverse, designation, None)?.position_in_site();
     let start = TruthSource::true_site_from_rover(traverse, 0)?;
-    let goal_m = goal_position_m(command, &target, [start.translation.x, start.translation.y]);
+    let goal_m = goal_position_m(command, 0, &target, [start.translation.x, start.translation.y]);
     true_way_m(traverse.world()?, &start, goal_m, settings)
 }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use sightline_geometry::cancel::Cancel;
 use sightline_recordings::DrivenTraverse;
-use sightline_rover::driving::{ArrivalAction, DriveCommand, Motion, StopReason};
+use sightline_rover::driving::{ArrivalAction, DriveCommand, Motion, NavigatorKind, StopReason};
 use sightline_rover::visual_odometry::OdometryMode;
 use sightline_session::targeted_drive::TargetedDrive;
 use sightline_track::presets::preset;
@@ -19,16 +19,24 @@ fn scenario() -> Scenario {
     scenario.camera.rig = CameraRig::MerNavcam;
     scenario.camera.hand_over = None;
     let name = "front_hazcam".parse().unwrap();
-    scenario.camera.further.push(FurtherRig { name, rig: CameraRig::MerFrontHazcam, image_size: 512 });
+    scenario.camera.further.push(FurtherRig {
+        name,
+        rig: CameraRig::MerFrontHazcam,
+        look_deg: None,
+        image_size: 512,
+    });
     scenario.drive.end_distance_m = 4.0;
     scenario
 }
 
 fn begin(folder: &Path, command: DriveCommand, settings: &Settings) -> TargetedDrive {
-    let scenario = scenario();
-    let world = DrivenTraverse::begin(&scenario, folder, Cancel::default()).unwrap();
+    begin_in(&scenario(), folder, command, settings)
+}
+
+fn begin_in(scenario: &Scenario, folder: &Path, command: DriveCommand, settings: &Settings) -> TargetedDrive {
+    let world = DrivenTraverse::begin(scenario, folder, Cancel::default()).unwrap();
     let traverse = world.traverse();
-    let pixel = choose_targets(traverse.world().unwrap(), &scenario, traverse.index())[0];
+    let pixel = choose_targets(traverse.world().unwrap(), scenario, traverse.index())[0];
     let designation = Designation::new(0, pixel);
     TargetedDrive::begin(world, designation, command, settings, Cancel::default()).unwrap()
 }
@@ -127,4 +135,48 @@ fn a_target_is_handed_over_to_the_hazcams_and_registered_to_the_first_view() {
 fn drive_target(world: &DrivenTraverse, scenario: &Scenario) -> Designation {
     let traverse = world.traverse();
     Designation::new(0, choose_targets(traverse.world().unwrap(), scenario, traverse.index())[0])
+}
+
+#[test]
+fn an_approach_after_arrival_brings_the_target_into_reach_of_the_arm() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = preset("combined").unwrap().settings().unwrap();
+    let on_arrival = vec![ArrivalAction::Approach, ArrivalAction::Look, ArrivalAction::HandOff];
+    let command = DriveCommand { on_arrival, ..DriveCommand::default() };
+    // The wheels' lines are free of rocks up to the end of the planned drive.
+    let mut scenario = scenario();
+    scenario.drive.end_distance_m = 1.8;
+    let mut drive = begin_in(&scenario, &folder.path().join("clear"), command.clone(), &settings);
+    to_end(&mut drive, &settings);
+    let summary = drive.summary();
+    println!("{summary:?}");
+    assert_eq!((summary.reason, summary.collisions), (Some(StopReason::Arrived), 0));
+    // The goal of the summary is that of the approach.
+    assert!(summary.goal_error_m.unwrap() < 0.06 && summary.target_error_m.unwrap() < 0.02, "{summary:?}");
+    let begun = drive.cycles.iter().position(|cycle| cycle.action == Some(ArrivalAction::Approach)).unwrap();
+    let approach = &drive.cycles[begun];
+    assert!(approach.motion.is_some() && approach.arrival_actions == 1, "it drives at once");
+    assert!((0.6..0.8).contains(&approach.goal.distance_m), "{:?}", approach.goal);
+    let actions: Vec<_> = drive.cycles[begun + 1..].iter().filter_map(|cycle| cycle.action).collect();
+    assert_eq!(actions, [ArrivalAction::Look, ArrivalAction::HandOff], "in their order, after the approach");
+    let looks = drive.cycles.iter().position(|cycle| cycle.action == Some(ArrivalAction::Look)).unwrap();
+    assert!(drive.cycles[looks].goal.arrived);
+    let handed = drive.steps.last().unwrap();
+    let placement = handed.shape().unwrap().placement.expect("the arm is told");
+    assert!(placement.is_reachable, "{placement:?}");
+
+    // Where rocks lie on the way, an approach without a map stalls at one; with a map it does not begin.
+    let to_rocks = |name: &str, navigator: NavigatorKind| {
+        let command = DriveCommand { standoff_m: 2.6, navigator, ..command.clone() };
+        let mut drive = begin(&folder.path().join(name), command, &settings);
+        to_end(&mut drive, &settings);
+        drive
+    };
+    assert_eq!(to_rocks("blind", NavigatorKind::Arcs).summary().reason, Some(StopReason::Stalled));
+    let drive = to_rocks("map", NavigatorKind::Gestalt);
+    let (summary, last) = (drive.summary(), drive.cycles.last().unwrap());
+    println!("{summary:?}");
+    assert_eq!((summary.reason, summary.collisions), (Some(StopReason::NoSafePath), 0));
+    let detail = last.ending.as_ref().unwrap().detail.as_deref().unwrap();
+    assert!(detail.starts_with("the way of the approach is not clear: at x "), "{detail}");
 }

@@ -87,8 +87,9 @@ fn the_map_leads_round_a_rock_that_stalls_an_arc_and_a_resumed_drive_too() {
 fn a_drive_without_the_pair_of_the_map_is_refused_in_one_sentence() {
     let folder = tempfile::tempdir().unwrap();
     let refused = |name: &str, scenario: &Scenario, hazard_camera: Option<&str>| {
-        let hazard_camera = hazard_camera.map(|name| name.parse::<CameraName>().unwrap());
-        let command = DriveCommand { hazard_camera, ..command(NavigatorKind::Morphin) };
+        let hazard_cameras = hazard_camera.map(|name| name.parse::<CameraName>().unwrap());
+        let hazard_cameras = hazard_cameras.into_iter().collect();
+        let command = DriveCommand { hazard_cameras, ..command(NavigatorKind::Morphin) };
         begin(scenario, command, &folder.path().join(name)).err().unwrap()
     };
     let mut without = scenario();
@@ -97,7 +98,7 @@ fn a_drive_without_the_pair_of_the_map_is_refused_in_one_sentence() {
     assert!(sentence.contains("navigator: `morphin` needs a pair of hazcams at every stop"), "{sentence}");
     assert!(sentence.contains("camera.further"), "{sentence}");
     let sentence = refused("other", &scenario(), Some("rear"));
-    assert!(sentence.contains("hazard_camera: stop 0 has no pair `rear`"), "{sentence}");
+    assert!(sentence.contains("hazard_cameras: stop 0 has no pair `rear`"), "{sentence}");
     assert!(sentence.contains("choose `front_hazcam`"), "{sentence}");
 }
 
@@ -158,7 +159,7 @@ fn a_drive_whose_goal_is_a_rock_ends_beside_it_and_says_so() {
     let mut rocks = traverse.world().unwrap().rocks().iter();
     let rock = rocks.find(|rock| rock.height_m > 0.35 && (1.0..4.0).contains(&rock.centre.x)).unwrap().centre;
     let target = traverse.site_from_rover(0) * drive.steps[0].trace.update.target.position_in_rover;
-    let goal = goal_position_m(&drive.command, &target, [0.0, 0.0]);
+    let goal = goal_position_m(&drive.command, 0, &target, [0.0, 0.0]);
     drive.command.offset_m = [rock.x - goal[0], rock.y - goal[1]];
     to_end(&mut drive);
     let summary = drive.summary();

@@ -14,6 +14,7 @@ mod records;
 mod rendering;
 mod driving;
 mod driving_hazards;
+mod driving_wedges;
 mod driving_odometry;
 mod terrain_odometry;
 mod stage_pause;

@@ -40,6 +40,9 @@ pub(super) struct Driving {
     /// Leave out the drives with a fixed goal.
     #[arg(long)]
     only_following: bool,
+    /// Keep the drives in this folder, each with its images.
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
     /// What is written to the standard output.
     #[arg(long, default_value = "text")]
     format: Format,
@@ -70,7 +73,8 @@ impl Driving {
     pub(super) fn run(&self) -> Result<()> {
         let mut scenario = open::scenario(&self.scenario)?;
         self.of.size(&mut scenario);
-        let folder = std::env::temp_dir().join(format!("sightline-driving-{}", std::process::id()));
+        let unkept = std::env::temp_dir().join(format!("sightline-driving-{}", std::process::id()));
+        let folder = self.out.clone().unwrap_or_else(|| unkept.clone());
         let seeds: Vec<u64> = (self.of.seed..self.of.seed + self.worlds).collect();
         let settings = self.of.settings()?;
         let rules = [GoalRule::FollowsTarget, GoalRule::Fixed];
@@ -97,6 +101,7 @@ impl Driving {
                 settings: &settings,
                 obstacles: self.obstacles,
                 folder: &folder,
+                keeps: self.out.is_some(),
             };
             let drives = study.run(&seeds, &tell);
             let outcome = outcome(&drives);
@@ -108,7 +113,7 @@ impl Driving {
             let text = serde_json::to_string(&report).map_err(|error| Error::Request(error.to_string()))?;
             terminal::line(&text)?;
         }
-        let _ = std::fs::remove_dir_all(&folder);
+        let _ = std::fs::remove_dir_all(&unkept);
         Ok(())
     }
 }

@@ -88,10 +88,10 @@ pub(super) struct Drive {
     /// The navigator that chooses the motions.
     #[arg(long, value_name = "NAME", default_value = "arcs")]
     navigator: NavigatorName,
-    /// The pair of every stop that gives the hazard map, by its name in camera.further; by default the first hazcams that look
-    /// ahead.
+    /// A pair of every stop that gives the hazard map, by its name in camera.further; may be given more than once. By default the
+    /// first hazcams that look ahead.
     #[arg(long, value_name = "NAME")]
-    hazard_camera: Option<CameraName>,
+    hazard_camera: Vec<CameraName>,
     /// Ground nearer to the target counts as good on the hazard map, m.
     #[arg(long, value_name = "M", default_value_t = DriveCommand::default().exemption_radius_m)]
     exemption: f64,
@@ -114,6 +114,9 @@ pub(super) struct Drive {
     /// An action after arrival; can be given more than once.
     #[arg(long, value_name = "ACTION")]
     on_arrival: Vec<OnArrival>,
+    /// Horizontal distance of the goal from the target in an approach after arrival, m.
+    #[arg(long, value_name = "M", default_value_t = DriveCommand::default().final_standoff_m)]
+    final_standoff: f64,
     /// A fault to inject: occluder, shadow, feature_starvation, pose_jump or camera_drop_out, its first and last stop, and, for the
     /// first two, the target it concerns, from 0: for example occluder:5-7 or shadow:8-9@1; can be given more than once.
     #[arg(long, value_name = "KIND:FROM-TO[@TARGET]", value_parser = super::fault::parse)]
@@ -304,7 +307,7 @@ impl Drive {
             },
             odometry_preset: self.odometry_preset.preset().1,
             navigator: self.navigator.kind(),
-            hazard_camera: self.hazard_camera,
+            hazard_cameras: self.hazard_camera.clone(),
             exemption_radius_m: self.exemption,
             slip_max: self.slip_max,
             slip_check: match self.slip_check {
@@ -315,6 +318,7 @@ impl Drive {
             flight_minutes_max: self.minutes,
             motions: self.motions.clone(),
             on_arrival: self.on_arrival.iter().map(|action| action.action()).collect(),
+            final_standoff_m: self.final_standoff,
             ..DriveCommand::default()
         }
     }

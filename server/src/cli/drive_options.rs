@@ -9,6 +9,8 @@ use sightline_rover::visual_odometry::OdometryMode;
 pub(super) enum OnArrival {
     /// Point the mast at the target, take another pair and locate the target in it.
     Look,
+    /// Drive on to the final standoff.
+    Approach,
     /// Locate the target in the pair on the body.
     HandOff,
 }
@@ -17,6 +19,7 @@ impl OnArrival {
     pub(super) const fn action(self) -> ArrivalAction {
         match self {
             Self::Look => ArrivalAction::Look,
+            Self::Approach => ArrivalAction::Approach,
             Self::HandOff => ArrivalAction::HandOff,
         }
     }

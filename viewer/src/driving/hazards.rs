@@ -102,7 +102,7 @@ impl State {
         }
         // The exemption is around the target of the run that drives.
         let by = [steering.target, steering.run];
-        let rules = format!("{by:?} {:?} {}", command.hazard_camera, command.exemption_radius_m);
+        let rules = format!("{by:?} {:?} {}", command.hazard_cameras, command.exemption_radius_m);
         Some(Key::Hazards { session: self.session.as_ref()?.id.clone(), step, rules })
     }
 

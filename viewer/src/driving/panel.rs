@@ -123,25 +123,7 @@ fn limits(ui: &mut Ui, command: &mut DriveCommand) {
         number(ui, "offset east", " m", east, (-20.0, 20.0), "Added to the goal");
         let stops = DragValue::new(&mut command.stops_max).range(2..=1000).prefix("stops ");
         ui.add(stops).accessible_name("stops").on_hover_text("Maximum number of stops, including the first");
-        let mut looks = command.on_arrival.iter().filter(|action| **action == ArrivalAction::Look).count();
-        let mut hands_off = looks < command.on_arrival.len();
-        let before = (looks, hands_off);
-        let drag = DragValue::new(&mut looks).range(0..=10).prefix("looks on arrival ");
-        let help =
-            "Stops at the goal at which the mast is pointed at the target again and another pair is taken";
-        ui.add(drag).accessible_name("looks on arrival").on_hover_text(help);
-        ui.checkbox(&mut hands_off, "hand off on arrival").on_hover_text(
-            "Locates the target in the pair of hazcams, near the arm, after the looks. The configuration combined registers the \
-             surface there; it needs hazcams at every stop.",
-        );
-        if hands_off && !before.1 {
-            // The surface of a look is registered best.
-            looks = looks.max(1);
-        }
-        if (looks, hands_off) != before {
-            command.on_arrival = vec![ArrivalAction::Look; looks];
-            command.on_arrival.extend(hands_off.then_some(ArrivalAction::HandOff));
-        }
+        arrival(ui, command);
         motions::field(ui, command);
         let presets = [OdometryPreset::Sightline, OdometryPreset::Mer2007];
         let pairs = [OdometryPair::Shared, OdometryPair::Own];
@@ -175,6 +157,37 @@ fn limits(ui: &mut Ui, command: &mut DriveCommand) {
         number(ui, "exemption", " m", &mut command.exemption_radius_m, (0.0, 5.0), help);
         number(ui, "time", " min", &mut command.flight_minutes_max, (1.0, 10_000.0), "Time on Mars");
     });
+}
+
+/// What the rover does after arrival: an approach, looks, and the hand-off, in this order.
+fn arrival(ui: &mut Ui, command: &mut DriveCommand) {
+    let has = |action| command.on_arrival.contains(&action);
+    let mut looks = command.on_arrival.iter().filter(|action| **action == ArrivalAction::Look).count();
+    let (mut approaches, mut hands_off) = (has(ArrivalAction::Approach), has(ArrivalAction::HandOff));
+    let before = (approaches, looks, hands_off);
+    ui.checkbox(&mut approaches, "approach on arrival").on_hover_text(
+        "Drives on from the goal to the final standoff, where the arm reaches the target: by arcs, if nothing high is under the rover on the way",
+    );
+    if approaches {
+        let help = "Horizontal distance of the rover from the target after the approach";
+        number(ui, "final standoff", " m", &mut command.final_standoff_m, (0.3, 50.0), help);
+    }
+    let drag = DragValue::new(&mut looks).range(0..=8).prefix("looks on arrival ");
+    let help = "Stops at the goal at which the mast is pointed at the target again and another pair is taken";
+    ui.add(drag).accessible_name("looks on arrival").on_hover_text(help);
+    ui.checkbox(&mut hands_off, "hand off on arrival").on_hover_text(
+        "Locates the target in the pair of hazcams, near the arm, after the looks. The configuration combined registers the \
+         surface there; it needs hazcams at every stop.",
+    );
+    if hands_off && !before.2 {
+        // The surface of a look is registered best.
+        looks = looks.max(1);
+    }
+    if (approaches, looks, hands_off) != before {
+        command.on_arrival = approaches.then_some(ArrivalAction::Approach).into_iter().collect();
+        command.on_arrival.extend(vec![ArrivalAction::Look; looks]);
+        command.on_arrival.extend(hands_off.then_some(ArrivalAction::HandOff));
+    }
 }
 
 /// Whether refused motions end the drive, and how many in a row.

@@ -1,6 +1,6 @@
 //! The command of a targeted drive: standoff, offset, limits and actions after arrival (R5–R8). The target is that of the run.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::ToSchema;
 
 use sightline_geometry::camera::CameraName;
@@ -92,9 +92,15 @@ impl NavigatorKind {
 pub enum ArrivalAction {
     /// Points the mast at the located target, takes another pair and locates the target in it.
     Look,
-    /// Locates the target in the pair on the body, near the arm: that of `hazard_camera`, or the first one that looks ahead (R205).
+    /// Drives on to `final_standoff_m` from the target, into the workspace of the arm: by arcs, and with a hazard map only where
+    /// nothing on it under wheels and body is too high (`no_safe_path`). The next action follows when the rover is there.
+    Approach,
+    /// Locates the target in the pair on the body, near the arm: that of `hazard_cameras`, or the first one that looks ahead (R205).
     HandOff,
 }
+
+/// Most pairs of the hazard map.
+const HAZARD_CAMERAS_MAX: usize = 4;
 
 /// Most actions after arrival.
 const ACTIONS_MAX: usize = 10;
@@ -133,9 +139,11 @@ pub struct DriveCommand {
     pub odometry_preset: OdometryPreset,
     /// The navigator (`arcs`).
     pub navigator: NavigatorKind,
-    /// The pair of every stop whose images give the hazard map, by its name (null: the first pair on the body that looks ahead).
-    /// The target is handed over to it on arrival, too (`on_arrival`). With `arcs`, and without a hand-off, it has no effect.
-    pub hazard_camera: Option<CameraName>,
+    /// The pairs of every stop whose images give the hazard map, by their names (none: the first pair on the body that looks ahead;
+    /// 4 at most). The target is handed over to the first of them that is on the body, too (`on_arrival`). With `arcs`, and without
+    /// a hand-off, it has no effect. Older files have `hazard_camera`: one name, or null.
+    #[serde(alias = "hazard_camera", deserialize_with = "names")]
+    pub hazard_cameras: Vec<CameraName>,
     /// Ground nearer to the target counts as good on the hazard map, m (0: none; 0 to 5; Kim09 §6).
     pub exemption_radius_m: f64,
     /// The drive stops when the slip of a step is measured as larger, as a part of the wheels' motion (0.9; 0.05 to 2). Without
@@ -154,8 +162,12 @@ pub struct DriveCommand {
     /// The drive has then ended with the last of them, and the target is tracked along.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub motions: Vec<Motion>,
-    /// Actions after arrival, in this order (none; 10 at most). Each is one more stop, at which the rover stays.
+    /// Actions after arrival, in this order (none; 10 at most). A look and the hand-off are one more stop each, at which the rover
+    /// stays.
     pub on_arrival: Vec<ArrivalAction>,
+    /// Horizontal distance of the goal from the target in an `approach` after arrival, m (1.3: ours, from where the arm reaches the
+    /// target; 0.3 to 50).
+    pub final_standoff_m: f64,
 }
 
 impl Default for DriveCommand {
@@ -173,7 +185,7 @@ impl Default for DriveCommand {
             odometry_pair: OdometryPair::Shared,
             odometry_preset: OdometryPreset::Sightline,
             navigator: NavigatorKind::Arcs,
-            hazard_camera: None,
+            hazard_cameras: Vec::new(),
             exemption_radius_m: 0.0,
             slip_max: 0.9,
             slip_check: SlipCheck::Wheels,
@@ -182,8 +194,23 @@ impl Default for DriveCommand {
             flight_minutes_max: 480.0,
             motions: Vec::new(),
             on_arrival: Vec::new(),
+            final_standoff_m: 1.3,
         }
     }
+}
+
+/// Names as a list, as one name, or as null for none.
+fn names<'de, D: Deserializer<'de>>(document: D) -> std::result::Result<Vec<CameraName>, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged, expecting = "a list of names of cameras, each of 1 to 32 characters of a-z, 0-9 and _")]
+    enum Names {
+        List(Vec<CameraName>),
+        One(Option<CameraName>),
+    }
+    Ok(match Names::deserialize(document)? {
+        Names::List(names) => names,
+        Names::One(name) => name.into_iter().collect(),
+    })
 }
 
 impl DriveCommand {
@@ -199,6 +226,7 @@ impl DriveCommand {
             Err(Error::setting(key, format!("{value} is outside {low} to {high}")))
         };
         within("standoff_m", self.standoff_m, 0.3, 50.0)?;
+        within("final_standoff_m", self.final_standoff_m, 0.3, 50.0)?;
         within("offset_m[0]", self.offset_m[0], -20.0, 20.0)?;
         within("offset_m[1]", self.offset_m[1], -20.0, 20.0)?;
         within("tolerance_m", self.tolerance_m, 0.001, 1.0)?;
@@ -216,6 +244,20 @@ impl DriveCommand {
             let turn_deg = turn_rad.to_degrees();
             within(&format!("motions[{index}]: turn in deg"), turn_deg, -360.0, 360.0)?;
         }
+        within(
+            "hazard_cameras (number of pairs)",
+            self.hazard_cameras.len() as f64,
+            0.0,
+            HAZARD_CAMERAS_MAX as f64,
+        )?;
+        if let Some(twice) = self
+            .hazard_cameras
+            .iter()
+            .enumerate()
+            .find_map(|(index, name)| self.hazard_cameras[..index].contains(name).then_some(name))
+        {
+            return Err(Error::setting("hazard_cameras", format!("{twice} is named twice")));
+        }
         let looks = self.on_arrival.len();
         if looks <= ACTIONS_MAX && looks + 2 > self.stops_max as usize {
             let problem = format!(
@@ -224,6 +266,7 @@ impl DriveCommand {
             );
             return Err(Error::setting("stops_max", problem));
         }
+        self.validate_approach()?;
         within("on_arrival (number of actions)", self.on_arrival.len() as f64, 0.0, ACTIONS_MAX as f64)?;
         if self.tolerance_m >= self.standoff_m {
             let problem = format!(
@@ -233,6 +276,40 @@ impl DriveCommand {
             return Err(Error::setting("tolerance_m", problem));
         }
         Ok(())
+    }
+
+    fn validate_approach(&self) -> Result<()> {
+        let approaches = self.on_arrival.iter().filter(|action| **action == ArrivalAction::Approach).count();
+        let problem = match approaches {
+            0 => return Ok(()),
+            1 if self.is_directed() => "an approach needs a goal: leave it out, or the motions",
+            1 if self.final_standoff_m >= self.standoff_m => {
+                let problem = format!(
+                    "{} m is not less than the standoff of {} m, from which the rover approaches",
+                    self.final_standoff_m, self.standoff_m
+                );
+                return Err(Error::setting("final_standoff_m", problem));
+            }
+            1 if self.tolerance_m >= self.final_standoff_m => {
+                let problem = format!("{} m is not less than final_standoff_m", self.tolerance_m);
+                return Err(Error::setting("tolerance_m", problem));
+            }
+            1 => return Ok(()),
+            _ => "the rover can approach once: leave the other ones out",
+        };
+        Err(Error::setting("on_arrival", problem))
+    }
+
+    /// The horizontal distance of the goal from the target, m, after so many actions after arrival were begun.
+    pub fn standoff_after_m(&self, actions: u32) -> f64 {
+        let begun = &self.on_arrival[..(actions as usize).min(self.on_arrival.len())];
+        if begun.contains(&ArrivalAction::Approach) { self.final_standoff_m } else { self.standoff_m }
+    }
+
+    /// Whether the rover is on its way to the final standoff after so many actions, if it is not at its goal.
+    pub(crate) fn is_approach(&self, actions: u32) -> bool {
+        let last = (actions as usize).checked_sub(1).and_then(|last| self.on_arrival.get(last));
+        last == Some(&ArrivalAction::Approach)
     }
 
     /// Whether the rover drives given motions instead of those to a goal.
@@ -279,44 +356,5 @@ impl DriveCommand {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_command_is_refused_with_the_field_that_is_wrong() {
-        let ahead = Point3::new(8.0, 1.0, 0.2);
-        let told = |change: fn(&mut DriveCommand), target: Point3| {
-            let mut command = DriveCommand::default();
-            change(&mut command);
-            command.validate_for(&target).map_err(|error| error.to_string())
-        };
-        assert!(told(|_| (), ahead).is_ok());
-        for (change, target, part) in [
-            (
-                (|c| c.standoff_m = 9.0) as fn(&mut DriveCommand),
-                ahead,
-                "standoff_m: 9 m is not less than the 8.06 m",
-            ),
-            (|c| c.standoff_m = f64::NAN, ahead, "standoff_m: NaN is outside"),
-            (|_| (), Point3::new(-3.0, 1.0, 0.2), "3.00 m behind the rover"),
-            (|c| (c.standoff_m, c.tolerance_m) = (0.5, 0.5), ahead, "tolerance_m"),
-            (|c| c.step_fraction = 0.0, ahead, "step_fraction"),
-            (|c| c.stops_max = 1, ahead, "stops_max"),
-            (
-                |c| c.motions = vec![Motion::Arc { length_m: 30.0, curvature_per_m: 0.0 }],
-                ahead,
-                "motions[0]: length in m: 30 is outside -20 to 20",
-            ),
-            (|c| c.slip_max = 0.0, ahead, "slip_max"),
-            (|c| c.on_arrival = vec![ArrivalAction::Look; 11], ahead, "on_arrival"),
-            (
-                |c| (c.stops_max, c.on_arrival) = (3, vec![ArrivalAction::Look; 2]),
-                ahead,
-                "stops_max: 3 stops are too few for two stops and 2 looks",
-            ),
-        ] {
-            let message = told(change, target).unwrap_err();
-            assert!(message.contains(part), "{message}");
-        }
-    }
-}
+#[path = "command_tests.rs"]
+mod tests;

@@ -131,7 +131,8 @@ pub(super) fn ending(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &Cycle) -
     }
     // A later look may put the goal a little elsewhere; the rover has arrived all the same.
     let is_at_goal = cycle.goal.arrived && input.last.why_not_searched().is_none();
-    if !command.is_directed() && (is_at_goal || cycle.arrival_actions > 0) {
+    let has_acted = cycle.arrival_actions > 0 && !command.is_approach(cycle.arrival_actions);
+    if !command.is_directed() && (is_at_goal || has_acted) {
         return end(StopReason::Arrived, cycle.goal.distance_m, command.tolerance_m);
     }
     // The baseline drives on whatever tracking makes of it.

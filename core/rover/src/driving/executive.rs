@@ -177,7 +177,6 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
     let pose = stops.site_from_rover(step);
     let start = stops.site_from_rover(input.since()).translation.vector;
     let target_in_site = target_in_site(input, stops);
-    let goal = set_goal(input.command, &target_in_site, [start.x, start.y], &pose);
     let (left, right) = stops.cameras(step);
     let mut time = FlightTime::of_stop([left.size, right.size], stops.measured_motion(step));
     if input.last.why_not_searched().is_some() {
@@ -186,10 +185,11 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
     let flight_minutes = input.before.map_or(0.0, |before| before.flight_minutes) + time.total_s() / 60.0;
     let before_here = input.before.filter(|before| before.step >= input.since());
     let arrival_actions = before_here.map_or(0, |before| before.arrival_actions);
+    let goal = |actions: u32| set_goal(input.command, actions, &target_in_site, [start.x, start.y], &pose);
     let [estimated, by_wheels] = reckoned(stops, input, &pose);
     let mut cycle = Cycle {
         step,
-        goal,
+        goal: goal(arrival_actions),
         estimated,
         by_wheels,
         motion: None,
@@ -211,7 +211,11 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
         return cycle;
     }
     begin_action(input, &mut cycle);
-    if cycle.action.is_some() {
+    if let Some(action) = cycle.action {
+        if action == ArrivalAction::Approach {
+            cycle.goal = goal(cycle.arrival_actions);
+            choose_motion(stops, input, &mut cycle, &target_in_site);
+        }
         return cycle;
     }
     cycle.ending = ending(stops, input, &cycle);
@@ -228,7 +232,8 @@ fn begin_action(input: &CycleInput<'_>, cycle: &mut Cycle) {
     } else {
         cycle.goal.arrived && !input.last.is_odometry_alone()
     };
-    let has_arrived = is_there || cycle.arrival_actions > 0;
+    let has_acted = cycle.arrival_actions > 0 && !input.command.is_approach(cycle.arrival_actions);
+    let has_arrived = is_there || has_acted;
     cycle.action =
         input.command.on_arrival.get(cycle.arrival_actions as usize).copied().filter(|_| has_arrived);
     cycle.arrival_actions += u32::from(cycle.action.is_some());

@@ -1,7 +1,8 @@
-//! Stage 8 in the loop, `map_hazards`: the goodness map of each stop, from the images of one pair of every stop since the designation.
+//! Stage 8 in the loop, `map_hazards`: the goodness map of each stop, from the images of one or several pairs of every stop since the
+//! designation.
 //!
 //! ```text
-//! pair of stop k ─► range_points ─► map_hazards (map of stop k − 1, pose estimate of stop k) ─► assess ─► goodness map of stop k
+//! pairs of stop k ─► range_points ─► map_hazards (map of stop k − 1, pose estimate of stop k) ─► assess ─► goodness map of stop k
 //! ```
 //! The map of a stop is a function of the stops up to it and of the command: a drive that is resumed or branched has the same bits.
 //! [`HazardMaps`] keeps the results, so that a decision that is requested again costs no second stereo.
@@ -18,17 +19,18 @@ use sightline_track::trace::StepTrace;
 
 use super::command::DriveCommand;
 use crate::hazards::{
-    GoodnessMap, HazardMap, HazardSettings, MapRules, Scan, assess, map_hazards, range_noise, range_points,
+    GoodnessMap, HazardMap, HazardSettings, MapRules, RangeNoise, Scan, assess, map_hazards, range_noise,
+    range_points,
 };
 use crate::pair::FurtherCamera;
 use crate::pipeline::Stops;
 
-/// The outcome of the pair of a stop.
+/// The outcome of the pairs of a stop.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RangeData {
-    /// The number of its points.
+    /// The number of their points.
     Points(usize),
-    /// The reason why there are none.
+    /// The reason why one has none.
     Missing(String),
 }
 
@@ -53,31 +55,43 @@ impl StopHazards {
     }
 }
 
-/// The pair of the hazard map of a command, at the stop of the designation; `None` for a navigator without a map.
+/// The pairs of the hazard map of a command, at the stop of the designation; none for a navigator without a map.
 ///
 /// # Errors
 /// [`Error::Setting`] for a stop without such a pair.
-pub fn hazard_camera(stops: &dyn Stops, step: usize, command: &DriveCommand) -> Result<Option<CameraName>> {
-    if command.navigator.needs_map() { body_pair(stops, step, command).map(Some) } else { Ok(None) }
+pub fn hazard_cameras(stops: &dyn Stops, step: usize, command: &DriveCommand) -> Result<Vec<CameraName>> {
+    if !command.navigator.needs_map() {
+        return Ok(Vec::new());
+    }
+    if command.hazard_cameras.is_empty() {
+        return Ok(vec![body_pair(stops, step, command)?]);
+    }
+    let cameras = stops.further_cameras(step);
+    let is_pair =
+        |name: CameraName| cameras.iter().any(|camera| camera.name == name && camera.right.is_some());
+    match command.hazard_cameras.iter().find(|name| !is_pair(**name)) {
+        None => Ok(command.hazard_cameras.clone()),
+        Some(name) => {
+            let problem = format!("stop {step} has no pair `{name}`; {}", choices(&cameras));
+            Err(Error::setting("hazard_cameras", problem))
+        }
+    }
 }
 
-/// The pair on the body that a command names, or else the first one that looks ahead, for the hazard map and the hand-off.
+/// The first pair on the body that a command names, or else the first one that looks ahead, for the hazard map and the hand-off.
 ///
 /// # Errors
 /// [`Error::Setting`] for a stop without such a pair.
 pub fn body_pair(stops: &dyn Stops, step: usize, command: &DriveCommand) -> Result<CameraName> {
     let cameras = stops.further_cameras(step);
-    if let Some(name) = command.hazard_camera {
-        if cameras.iter().any(|camera| camera.name == name && camera.right.is_some()) {
-            return Ok(name);
-        }
-        let problem = format!("stop {step} has no pair `{name}`; {}", choices(&cameras));
-        return Err(Error::setting("hazard_camera", problem));
+    let is_on_body = |camera: &FurtherCamera<'_>| camera.right.is_some() && camera.mast_angles.is_none();
+    let is_named =
+        |name: &&CameraName| cameras.iter().any(|camera| camera.name == **name && is_on_body(camera));
+    if let Some(name) = command.hazard_cameras.iter().find(is_named) {
+        return Ok(*name);
     }
-    let is_hazcam = |camera: &&FurtherCamera<'_>| {
-        camera.right.is_some() && camera.mast_angles.is_none() && camera.left.model.axis().x > 0.0
-    };
-    if let Some(camera) = cameras.iter().find(is_hazcam) {
+    let looks_ahead = |camera: &&FurtherCamera<'_>| is_on_body(camera) && camera.left.model.axis().x > 0.0;
+    if let Some(camera) = cameras.iter().find(looks_ahead) {
         return Ok(camera.name);
     }
     let add = "add one with rig mer_front_hazcam to camera.further of the scenario";
@@ -87,7 +101,7 @@ pub fn body_pair(stops: &dyn Stops, step: usize, command: &DriveCommand) -> Resu
         return Err(Error::setting("on_arrival", problem));
     }
     let problem = format!(
-        "`{}` needs a pair of hazcams at every stop, and this drive has none; {add}, name another pair as hazard_camera, or \
+        "`{}` needs a pair of hazcams at every stop, and this drive has none; {add}, name other pairs as hazard_cameras, or \
          choose `arcs`",
         command.navigator.name()
     );
@@ -112,12 +126,19 @@ struct Mapped {
     assessed: Option<(MapRules, Arc<StopHazards>)>,
 }
 
+/// The points of a pair, rover frame, m, with their error.
+#[derive(Default)]
+struct PairPoints {
+    points: Vec<Point3>,
+    noise: Option<RangeNoise>,
+}
+
 /// The hazard maps of a drive, computed stop by stop and kept.
 #[derive(Clone, Debug, Default)]
 pub struct HazardMaps {
     settings: HazardSettings,
-    /// Pair and first stop of the map.
-    source: Option<(CameraName, usize)>,
+    /// Pairs and first stop of the map.
+    source: Option<(Vec<CameraName>, usize)>,
     /// By stop since the first.
     stops: Vec<Mapped>,
     /// The map of the last of them, with the distance driven, m.
@@ -137,16 +158,17 @@ impl HazardMaps {
         [first, last]: [&StepTrace; 2],
         cancel: Cancel<'_>,
     ) -> Result<Option<Arc<StopHazards>>> {
-        let camera = match hazard_camera(stops, first.step, command) {
-            Ok(Some(camera)) => camera,
-            // Refused at the begin of the drive; a command that was changed on the way has no range data.
-            Ok(None) | Err(_) => return Ok(None),
-        };
+        // Refused at the begin of the drive; a command that was changed on the way has no range data.
+        let cameras = hazard_cameras(stops, first.step, command).unwrap_or_default();
+        if cameras.is_empty() {
+            return Ok(None);
+        }
         let index = last.step - first.step;
-        if self.source != Some((camera, first.step)) || !self.is_of(stops, first.step) {
+        let source = Some((cameras, first.step));
+        if self.source != source || !self.is_of(stops, first.step) {
             self.clear();
         }
-        self.source = Some((camera, first.step));
+        self.source.clone_from(&source);
         self.settings.exemption_radius_m = command.exemption_radius_m;
         let target = stops.site_from_rover(last.step) * last.update.target.position_in_rover;
         let rules = self.rules(stops, [first.step, last.step], [target.x, target.y]);
@@ -158,10 +180,10 @@ impl HazardMaps {
         if self.stops.len() > index + 1 {
             // The map itself is kept for the last stop alone.
             self.clear();
-            self.source = Some((camera, first.step));
+            self.source = source;
         }
         while self.stops.len() <= index {
-            self.map_next(stops, (camera, first.step + self.stops.len()), cancel)?;
+            self.map_next(stops, first.step + self.stops.len(), cancel)?;
         }
         let (Some(map), Some(mapped)) = (&self.map, self.stops.get_mut(index)) else { return Ok(None) };
         let hazards = Arc::new(StopHazards {
@@ -194,40 +216,37 @@ impl HazardMaps {
     }
 
     /// Adds the next stop to the map.
-    fn map_next(
-        &mut self,
-        stops: &dyn Stops,
-        (camera, step): (CameraName, usize),
-        cancel: Cancel<'_>,
-    ) -> Result<()> {
+    fn map_next(&mut self, stops: &dyn Stops, step: usize, cancel: Cancel<'_>) -> Result<()> {
         cancel.check()?;
-        let (points, range) = match self.points(stops, (camera, step), cancel)? {
-            Ok(points) => {
-                let range = RangeData::Points(points.len());
-                (points, range)
+        let cameras = self.source.as_ref().map(|(cameras, _)| cameras.clone()).unwrap_or_default();
+        let mut missing = None;
+        let mut scans = Vec::with_capacity(cameras.len());
+        for camera in cameras {
+            match self.points(stops, (camera, step), cancel)? {
+                Ok(scan) => scans.push(scan),
+                Err(why) => missing = missing.or(Some(why)),
             }
-            Err(why) => (Vec::new(), RangeData::Missing(why)),
-        };
+        }
+        let count = scans.iter().map(|scan: &PairPoints| scan.points.len()).sum();
+        let range = missing.map_or(RangeData::Points(count), RangeData::Missing);
         let site_from_rover = stops.site_from_rover(step);
         let moved = self.stops.last().map_or(0.0, |before| {
             let moved = site_from_rover.translation.vector - before.site_from_rover.translation.vector;
             moved.x.hypot(moved.y)
         });
         self.driven_m += moved;
-        let noise = stops.further_pair(step, camera).ok();
-        let noise = noise.and_then(|pair| range_noise([pair.left, pair.right], &self.settings));
-        let scan = Scan {
-            points_in_rover: &points,
-            site_from_rover: &site_from_rover,
-            driven_m: self.driven_m,
-            noise,
-        };
-        self.map = Some(map_hazards(self.map.as_ref(), &scan, &self.settings));
+        // Without a pair the map still moves with the rover.
+        scans.extend(scans.is_empty().then(PairPoints::default));
+        for PairPoints { points, noise } in &scans {
+            let (site_from_rover, driven_m) = (&site_from_rover, self.driven_m);
+            let scan = Scan { points_in_rover: points, site_from_rover, driven_m, noise: *noise };
+            self.map = Some(map_hazards(self.map.as_ref(), &scan, &self.settings));
+        }
         self.stops.push(Mapped { site_from_rover, range, assessed: None });
         Ok(())
     }
 
-    /// The points of a stop, or why there are none.
+    /// The points of a pair at a stop, or why there are none.
     ///
     /// # Errors
     /// [`Error::Cancelled`], and images that cannot be read or written: they may come at the next attempt.
@@ -236,14 +255,18 @@ impl HazardMaps {
         stops: &dyn Stops,
         (camera, step): (CameraName, usize),
         cancel: Cancel<'_>,
-    ) -> Result<Result<Vec<Point3>, String>> {
+    ) -> Result<Result<PairPoints, String>> {
         let pair = match stops.further_pair(step, camera) {
             Ok(pair) => pair,
             Err(error) => return Ok(Err(error.to_string())),
         };
-        let images = stops.capture_further(step, camera, cancel)?;
-        match range_points([&images.left, &images.right], [pair.left, pair.right], &self.settings, cancel) {
-            Ok(points) => Ok(Ok(points)),
+        let settings = match pair.mast_angles {
+            Some(_) => &self.settings.of_mast(),
+            None => &self.settings,
+        };
+        let (images, cameras) = (stops.capture_further(step, camera, cancel)?, [pair.left, pair.right]);
+        match range_points([&images.left, &images.right], cameras, settings, cancel) {
+            Ok(points) => Ok(Ok(PairPoints { points, noise: range_noise(cameras, settings) })),
             Err(Error::Cancelled) => Err(Error::Cancelled),
             Err(error) => Ok(Err(error.to_string())),
         }

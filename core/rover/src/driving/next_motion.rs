@@ -1,14 +1,16 @@
 //! The motion of a cycle: asks the navigator for a path and cuts it to what visual odometry follows.
 //!
-//! With a navigator on a hazard map the drive ends here without range data and where every path is vetoed; the rover then stays.
+//! With a navigator on a hazard map the drive ends here without range data and where every path is vetoed; the rover then stays. An
+//! approach after arrival takes arcs, and ends where the map has an obstacle under the rover on its way.
 
 use super::command::{DriveCommand, TrackedStops};
 use super::ending::{Ending, StopReason};
 use super::executive::{Cycle, CycleInput};
 use super::map_hazards::RangeData;
 use super::motion::Motion;
-use super::select_path::PathInput;
+use super::select_path::{ArcNavigator, Navigator, PathInput};
 use crate::hazards::goodness::GoodnessMap;
+use crate::navigation::clear_way::{self, Obstacle};
 use crate::navigation::counterfactual::LimitChange;
 use crate::pipeline::Stops;
 use crate::visual_odometry::OdometryMode;
@@ -23,21 +25,31 @@ const PART_MIN_M: f64 = 0.1;
 
 /// Chooses the motion of a cycle whose target is `distance_m` from the left camera, or ends the drive.
 pub(super) fn choose(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &mut Cycle, distance_m: f64) {
-    let map = match range(input) {
+    let is_approach = input.command.is_approach(cycle.arrival_actions);
+    let known = match range(input) {
         Ok(map) => map,
         Err(ending) => {
             cycle.ending = Some(ending);
             return;
         }
     };
+    let site_from_rover = &stops.site_from_rover(cycle.step);
+    if let Some(map) = known.filter(|_| is_approach)
+        && let Some(obstacle) = clear_way::obstacle(map, site_from_rover, cycle.goal.in_rover_m)
+    {
+        cycle.ending = Some(unclear(&obstacle));
+        return;
+    }
+    let (navigator, map): (&dyn Navigator, _) =
+        if is_approach { (&ArcNavigator::default(), None) } else { (input.navigator, known) };
     let path_input = PathInput {
         goal_m: cycle.goal.in_rover_m,
         step_m: step_m(input, distance_m),
         curvature_per_m: input.before.and_then(|before| before.motion).map_or(0.0, |m| m.curvature_per_m()),
         map,
-        site_from_rover: &stops.site_from_rover(cycle.step),
+        site_from_rover,
     };
-    let choice = input.navigator.select_path(&path_input);
+    let choice = navigator.select_path(&path_input);
     match choice.motion() {
         Some(motion) => {
             // On a map the rover drives no farther than the path was judged.
@@ -54,12 +66,23 @@ pub(super) fn choose(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &mut Cycl
             });
         }
         None => {
-            let change = input.navigator.smallest_change(&path_input, &choice);
+            let change = navigator.smallest_change(&path_input, &choice);
             let detail = change.as_ref().map_or_else(no_change, LimitChange::sentence);
             cycle.ending = Some(Ending::named(StopReason::NoSafePath, Some(detail)));
         }
     }
     cycle.choice = Some(choice).filter(|_| map.is_some());
+}
+
+/// The end of an approach whose way has an obstacle.
+fn unclear(obstacle: &Obstacle) -> Ending {
+    let [x_m, y_m] = obstacle.in_site_m;
+    let (height_m, limit_m) = (obstacle.height_m, obstacle.limit_m);
+    let detail = format!(
+        "the way of the approach is not clear: at x {x_m:.1} m, y {y_m:.1} m of the site the ground is {height_m:.2} m higher than \
+         around it, limit {limit_m:.2} m"
+    );
+    Ending::named(StopReason::NoSafePath, Some(detail))
 }
 
 fn no_change() -> String {

@@ -3,7 +3,7 @@
 //! ```text
 //! goal = target + standoff · (start − target)/|start − target| + offset      horizontally, site frame
 //! ```
-//! `start` is the rover at the time of the command. Frame: site, m. Source: papers.md R6, R7.
+//! `start` is the rover at the time of the command, and `standoff` the final one once an approach after arrival has begun. Frame: site, m. Source: papers.md R6, R7.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -26,11 +26,17 @@ pub struct Goal {
     pub arrived: bool,
 }
 
-/// Horizontal goal position for a target, x and y of the site frame, m; `start_m` is the rover at the time of the command.
-pub fn goal_position_m(command: &DriveCommand, target_in_site: &Point3, start_m: [f64; 2]) -> [f64; 2] {
+/// Horizontal goal position for a target, x and y of the site frame, m; `start_m` is the rover at the time of the command, `actions`
+/// the number of actions after arrival that were begun.
+pub fn goal_position_m(
+    command: &DriveCommand,
+    actions: u32,
+    target_in_site: &Point3,
+    start_m: [f64; 2],
+) -> [f64; 2] {
     let back = [start_m[0] - target_in_site.x, start_m[1] - target_in_site.y];
     let length_m = back[0].hypot(back[1]);
-    let scale = if length_m > 0.0 { command.standoff_m / length_m } else { 0.0 };
+    let scale = if length_m > 0.0 { command.standoff_after_m(actions) / length_m } else { 0.0 };
     [
         target_in_site.x + scale * back[0] + command.offset_m[0],
         target_in_site.y + scale * back[1] + command.offset_m[1],
@@ -40,11 +46,12 @@ pub fn goal_position_m(command: &DriveCommand, target_in_site: &Point3, start_m:
 /// The goal as seen from a rover.
 pub fn set_goal(
     command: &DriveCommand,
+    actions: u32,
     target_in_site: &Point3,
     start_m: [f64; 2],
     site_from_rover: &Pose,
 ) -> Goal {
-    let in_site_m = goal_position_m(command, target_in_site, start_m);
+    let in_site_m = goal_position_m(command, actions, target_in_site, start_m);
     let origin = site_from_rover.translation.vector;
     let (dx, dy) = (in_site_m[0] - origin.x, in_site_m[1] - origin.y);
     let (sine, cosine) = site_from_rover.rotation.euler_angles().2.sin_cos();
@@ -70,7 +77,7 @@ mod tests {
             [3.0, 4.0, 0.1].into(),
             attitude_from_roll_pitch_yaw(0.1, -0.05, std::f64::consts::FRAC_PI_2),
         );
-        let goal = set_goal(&command, &target, [0.0, 0.0], &pose);
+        let goal = set_goal(&command, 0, &target, [0.0, 0.0], &pose);
         // Ten metres away along (0.6, 0.8): two metres back is eight along it.
         assert!((goal.in_site_m[0] - (4.8 + 0.5)).abs() < 1e-12);
         assert!((goal.in_site_m[1] - (6.4 - 0.25)).abs() < 1e-12);
@@ -78,7 +85,7 @@ mod tests {
         assert!((goal.in_rover_m[0] - 2.15).abs() < 1e-12 && (goal.in_rover_m[1] + 2.3).abs() < 1e-12);
         assert!(!goal.arrived);
         let moved =
-            set_goal(&command, &(target + sightline_geometry::frames::Vector3::x()), [0.0, 0.0], &pose);
+            set_goal(&command, 0, &(target + sightline_geometry::frames::Vector3::x()), [0.0, 0.0], &pose);
         assert!(moved.in_site_m[0] > goal.in_site_m[0] + 0.5);
     }
 
@@ -87,7 +94,7 @@ mod tests {
         let command = DriveCommand { tolerance_m: 0.05, ..DriveCommand::default() };
         let at = |x: f64| {
             let pose = Pose::translation(x, 0.0, 0.0);
-            set_goal(&command, &Point3::new(10.0, 0.0, 0.0), [0.0, 0.0], &pose).arrived
+            set_goal(&command, 0, &Point3::new(10.0, 0.0, 0.0), [0.0, 0.0], &pose).arrived
         };
         assert!(at(7.96) && at(8.04) && !at(7.9) && !at(8.1));
     }

@@ -71,6 +71,9 @@ pub struct GoodnessCell {
     pub age_m: f32,
     /// Mean height of the cell's own points, z of the site frame, m; `None` with too few.
     pub height_m: Option<f32>,
+    /// Height of the upper edge of the cell: that of a face where its points are on one, otherwise the mean; z of the site frame, m.
+    #[serde(default)]
+    pub top_m: Option<f32>,
     /// 0 (bad) to 1; 0 if unknown.
     pub goodness: f32,
     /// Where the goodness comes from.
@@ -194,7 +197,7 @@ impl GoodnessCell {
 
     fn new(
         sums: &DiscSums,
-        (step_m, height_m): (f32, Option<f32>),
+        (step_m, heights_m): (f32, Option<[f32; 2]>),
         disc: &Disc,
         driven_m: f64,
         settings: &HazardSettings,
@@ -207,8 +210,9 @@ impl GoodnessCell {
         let known = sums.known / disc.count() as f64;
         let certainty = (count / settings.points_full).min(1.0) * known;
         let age_m = driven_m - sums.moments.odometer_m() / count;
-        let cell =
-            Self { step_m, certainty: certainty as f32, age_m: age_m as f32, height_m, ..Self::default() };
+        let [height_m, top_m] = [0, 1].map(|k| heights_m.map(|heights_m| heights_m[k]));
+        let (certainty_f32, age_m) = (certainty as f32, age_m as f32);
+        let cell = Self { step_m, certainty: certainty_f32, age_m, height_m, top_m, ..Self::default() };
         let Some(plane) = sums.moments.plane() else { return cell };
         let mut cell = Self {
             tilt_deg: plane.tilt_rad.to_degrees() as f32,
@@ -248,10 +252,14 @@ pub fn assess(map: &HazardMap, rules: &MapRules, settings: &HazardSettings) -> G
         .zip(&steps)
         .enumerate()
         .map(|(index, (sums, step_m))| {
-            let own = map.cell(index / map.grid.side, index % map.grid.side);
-            let height_m =
-                (own.count() >= settings.weight_min).then(|| (map.height_m + own.mean_height_m()) as f32);
-            let cell = GoodnessCell::new(sums, (*step_m, height_m), &disc, map.driven_m, settings);
+            let (row, column) = (index / map.grid.side, index % map.grid.side);
+            let own = map.cell(row, column);
+            let heights_m = (own.count() >= settings.weight_min).then(|| {
+                let mean_m = own.mean_height_m();
+                let top_m = map.upper_edge_m(row, column, settings.face_spread_m).unwrap_or(mean_m);
+                [mean_m, top_m].map(|relative_m| (map.height_m + relative_m) as f32)
+            });
+            let cell = GoodnessCell::new(sums, (*step_m, heights_m), &disc, map.driven_m, settings);
             cell.with_rules(map.grid.centre_m(index), rules)
         })
         .collect();

@@ -45,6 +45,8 @@ settings_group! {
         range_min_m: f64 = 0.4, "m", Domain::Between(0.1, 10.0), "ours";
         /// Points farther from the left camera are left out: their error is larger than the terms.
         range_max_m: f64 = 3.5, "m", Domain::Between(1.0, 100.0), "ours";
+        /// The same for a pair on the mast, which looks down more steeply and sees more sharply.
+        mast_range_max_m: f64 = 5.0, "m", Domain::Between(1.0, 100.0), "ours; docs/driving.md";
         /// 1σ of the disparity of a point: its height is that uncertain, and steps must exceed what follows from it.
         disparity_sigma_px: f64 = 0.25, "px", Domain::Between(0.0, 5.0), "ours; Kim09 §4.2 has 1/3";
         /// By so many 1σ of their heights' difference two cells must differ, before the rest counts as a step.
@@ -93,6 +95,7 @@ impl HazardSettings {
             (self.roughness_ok_m, self.roughness_bad_m, "roughness_ok_m"),
             (self.step_ok_m, self.step_bad_m, "step_ok_m"),
             (self.range_min_m, self.range_max_m, "range_min_m"),
+            (self.range_min_m, self.mast_range_max_m, "range_min_m"),
         ] {
             if ok >= bad {
                 return Err(Error::setting(key, format!("{ok} must be less than {bad}, the upper limit")));
@@ -103,6 +106,11 @@ impl HazardSettings {
             return Err(Error::setting("rover_radius_m", problem));
         }
         Ok(())
+    }
+
+    /// The settings for a pair on the mast.
+    pub(crate) fn of_mast(&self) -> Self {
+        Self { range_max_m: self.mast_range_max_m, ..self.clone() }
     }
 
     /// Cells along a side of the map, an even number.

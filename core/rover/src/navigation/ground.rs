@@ -22,6 +22,7 @@ const OUTSIDE: GoodnessCell = GoodnessCell {
     certainty: 0.0,
     age_m: 0.0,
     height_m: None,
+    top_m: None,
     goodness: 0.0,
     basis: CellBasis::Unknown,
 };

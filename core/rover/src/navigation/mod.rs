@@ -12,6 +12,7 @@
 //! | `navigator` | candidates, votes, choice |
 //! | `stand` | whether the rover can stand at its goal, and the nearest place where it can |
 //! | `way` | way to the goal: a search over positions and headings |
+//! | `clear_way` | whether the way of an approach after arrival is clear |
 //! | `counterfactual` | smallest change of a limit that opens paths |
 //!
 //! Frame: site, horizontal. Source: domain.md 8.
@@ -24,6 +25,7 @@ mod path;
 pub mod navigator;
 pub mod stand;
 mod way;
+pub(crate) mod clear_way;
 pub mod counterfactual;
 #[cfg(test)]
 mod tests;

@@ -52,7 +52,11 @@ pub(super) fn seen(
 }
 
 /// The map of a height function that is known all around.
-fn known(stance: &Pose, settings: &HazardSettings, height: impl Fn(f64, f64) -> f64) -> GoodnessMap {
+pub(super) fn known(
+    stance: &Pose,
+    settings: &HazardSettings,
+    height: impl Fn(f64, f64) -> f64,
+) -> GoodnessMap {
     let points = seen(stance, 6.0, 4.0, height);
     let scan = Scan { points_in_rover: &points, site_from_rover: stance, driven_m: 0.0, noise: None };
     assess(&map_hazards(None, &scan, settings), &MapRules::default(), settings)
