@@ -168,6 +168,7 @@ fn an_approach_after_arrival_brings_the_target_into_reach_of_the_arm() {
     // Where rocks lie on the way, an approach without a map stalls at one; with a map it does not begin.
     let to_rocks = |name: &str, navigator: NavigatorKind| {
         let command = DriveCommand { standoff_m: 2.6, navigator, ..command.clone() };
+        let settings = Settings::default();
         let mut drive = begin(&folder.path().join(name), command, &settings);
         to_end(&mut drive, &settings);
         drive

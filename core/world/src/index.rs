@@ -99,11 +99,7 @@ struct FurtherPair {
 
 impl FurtherPair {
     fn new(camera: &FurtherRig) -> Self {
-        let look = camera.look_deg.map(|look_deg| {
-            let [azimuth_rad, elevation_rad] = look_deg.map(f64::to_radians);
-            MastAngles { azimuth_rad, elevation_rad }
-        });
-        Self { name: camera.name, rig: Rig::of(camera.rig, camera.image_size), look }
+        Self { name: camera.name, rig: Rig::of(camera.rig, camera.image_size), look: camera.look() }
     }
 
     /// The told and the true angles for this pair, from those for the main pair.

@@ -22,7 +22,7 @@ use crate::ground::level::MEAN_GROUND_Z_M;
 use crate::rover::plan::{goal_m, planned};
 use crate::rover::scene::{TrueDrive, TrueStop};
 use crate::scenario::{CameraSettings, Course, DriveSettings};
-use sightline_geometry::camera::Camera;
+use sightline_geometry::camera::{Camera, MastAngles};
 use sightline_geometry::frames::{Pixel, Point3, Pose};
 
 /// Half of a wheel's width and a margin, m.
@@ -69,12 +69,17 @@ pub(crate) struct Around {
 }
 
 impl Around {
-    /// Of a drive with its cameras; nothing for a straight approach along x with well-pointed cameras on the mast,
-    /// whose wedge and lane are known without it.
+    /// Of a drive with its cameras; nothing for a straight approach along x with well-pointed cameras on the mast and no pair that is
+    /// turned elsewhere, whose wedge and lane are known without it.
     pub(crate) fn new(drive: &DriveSettings, camera: &CameraSettings) -> Option<Self> {
         let is_straight = drive.course == Course::Approach && drive.heading_deg == 0.0;
         let is_narrow = !camera.rig.is_on_body() && pointing_rad(drive) <= STRAIGHT_POINTING_RAD;
-        if is_straight && is_narrow {
+        let turned: Vec<(Rig, MastAngles)> = camera
+            .further
+            .iter()
+            .filter_map(|pair| Some((Rig::of(pair.rig, pair.image_size), pair.look()?)))
+            .collect();
+        if is_straight && is_narrow && turned.is_empty() {
             return None;
         }
         let TrueDrive { stops, legs } = planned(drive).ok()?;
@@ -85,7 +90,13 @@ impl Around {
             goal_m: [x_m, y_m],
             wedges: stops
                 .iter()
-                .flat_map(|stop| wedges(&rig, stop, &goal, pointing_rad(drive) + UNEVEN_RAD))
+                .flat_map(|stop| {
+                    let off_by_rad = pointing_rad(drive) + UNEVEN_RAD;
+                    let turned = turned.iter().flat_map(move |(rig, look)| {
+                        seen(rig, Some(*look), &stop.site_from_rover, off_by_rad)
+                    });
+                    wedges(&rig, stop, &goal, off_by_rad).into_iter().chain(turned)
+                })
                 .collect(),
             wheels_m: stands()
                 .flat_map(|stand| stand.contacts_in_site.map(|point| [point.x, point.y]))
@@ -129,8 +140,13 @@ fn pointing_rad(drive: &DriveSettings) -> f64 {
 fn wedges(rig: &Rig, stop: &TrueStop, goal: &Point3, off_by_rad: f64) -> Vec<Wedge> {
     let site_from_rover: &Pose = &stop.site_from_rover;
     let Ok(angles) = rig.point_at(&site_from_rover.inverse_transform_point(goal)) else { return Vec::new() };
+    seen(rig, angles, site_from_rover, off_by_rad).to_vec()
+}
+
+/// What both eyes of a rig see at mast angles.
+fn seen(rig: &Rig, angles: Option<MastAngles>, site_from_rover: &Pose, off_by_rad: f64) -> [Wedge; 2] {
     let (left, right) = rig.cameras_in_rover(angles);
-    [left, right].iter().map(|eye| Wedge::of(&eye.moved(site_from_rover), off_by_rad)).collect()
+    [left, right].map(|eye| Wedge::of(&eye.moved(site_from_rover), off_by_rad))
 }
 
 impl Wedge {
@@ -194,6 +210,21 @@ mod tests {
     use super::*;
     use crate::scenario::CameraRig;
     use crate::scenario::Move;
+
+    #[test]
+    fn a_pair_that_is_turned_aside_sees_what_lies_there() {
+        let scenario = crate::library::scenario("navcam-wedges").unwrap();
+        let mut ahead = scenario.camera.clone();
+        ahead.further.clear();
+        assert_eq!(Around::new(&scenario.drive, &ahead), None);
+        let around = Around::new(&scenario.drive, &scenario.camera).unwrap();
+        // 35° to either side of the mast, 15 m from it; 60° is outside.
+        let at = |deg: f64| {
+            let [x_m, y_m] = [15.0 * deg.to_radians().cos(), 15.0 * deg.to_radians().sin()];
+            around.sees(x_m + around.wedges[0].from_m[0], y_m)
+        };
+        assert!(at(35.0) && at(-35.0) && !at(60.0) && !at(-60.0));
+    }
 
     #[test]
     fn a_crab_sees_behind_the_targets_from_all_its_stops_and_keeps_its_wheels_free() {

@@ -5,7 +5,7 @@ use utoipa::ToSchema;
 
 use super::range::{MAX_SEED, within};
 use crate::traverse::FURTHER_CAMERAS_LIMIT;
-use sightline_geometry::camera::CameraName;
+use sightline_geometry::camera::{CameraName, MastAngles};
 use sightline_geometry::error::{Error, Result};
 
 /// The largest number of the 12-bit converter.
@@ -57,6 +57,14 @@ pub struct FurtherRig {
     /// Width of its images, px: 1024, 512, 256 or 128.
     #[serde(default = "full_size")]
     pub image_size: u32,
+}
+
+impl FurtherRig {
+    /// The angles to which the mast is turned for this pair, if not those of the main pair.
+    pub(crate) fn look(&self) -> Option<MastAngles> {
+        let [azimuth_rad, elevation_rad] = self.look_deg?.map(f64::to_radians);
+        Some(MastAngles { azimuth_rad, elevation_rad })
+    }
 }
 
 fn full_size() -> u32 {
