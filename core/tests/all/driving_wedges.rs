@@ -1,5 +1,7 @@
 //! A drive on a hazard map of the mast's navcams: two wedges show the way round a rock (R101, R102).
 
+use std::path::Path;
+
 use sightline_geometry::camera::CameraName;
 use sightline_geometry::cancel::Cancel;
 use sightline_recordings::DrivenTraverse;
@@ -28,28 +30,28 @@ fn name(text: &str) -> CameraName {
     text.parse().unwrap()
 }
 
-#[test]
-fn two_wedges_of_the_navcams_lead_round_a_rock() {
-    let folder = tempfile::tempdir().unwrap();
-    let scenario = scenario();
-    let world = DrivenTraverse::begin(&scenario, &folder.path().join("drive"), Cancel::default()).unwrap();
+/// The drive of a scenario on the map of these pairs, to its first target.
+fn begin(scenario: &Scenario, hazard_cameras: Vec<CameraName>, folder: &Path) -> TargetedDrive {
+    let world = DrivenTraverse::begin(scenario, folder, Cancel::default()).unwrap();
     let traverse = world.traverse();
-    let pixel = choose_targets(traverse.world().unwrap(), &scenario, traverse.index())[0];
-    let [left, right] = ["left_wedge", "right_wedge"].map(name);
+    let pixel = choose_targets(traverse.world().unwrap(), scenario, traverse.index())[0];
     // The small images are for the hazard map: tracking has no influence.
     let command = DriveCommand {
         navigator: NavigatorKind::Gestalt,
         goal: GoalRule::Fixed,
         stops_max: 60,
-        hazard_cameras: vec![left, right],
+        hazard_cameras,
         ..DriveCommand::default()
     };
-    let settings = Settings::default();
-    let begin = |world, command: DriveCommand| {
-        TargetedDrive::begin(world, Designation::new(0, pixel), command, &settings, Cancel::default())
-    };
-    let mut drive = begin(world, command.clone()).unwrap();
-    while drive.advance(&settings, Cancel::default()).unwrap() {}
+    let (designation, settings) = (Designation::new(0, pixel), Settings::default());
+    TargetedDrive::begin(world, designation, command, &settings, Cancel::default()).unwrap()
+}
+
+#[test]
+fn two_wedges_of_the_navcams_lead_round_a_rock() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut drive = begin(&scenario(), ["left_wedge", "right_wedge"].map(name).to_vec(), folder.path());
+    while drive.advance(&Settings::default(), Cancel::default()).unwrap() {}
     let summary = drive.summary();
     println!("{summary:?}");
     assert_eq!((summary.reason, summary.collisions), (Some(StopReason::Arrived), 0));
@@ -68,15 +70,14 @@ fn two_wedges_of_the_navcams_lead_round_a_rock() {
         let off_deg = axis.angle(&truth).to_degrees();
         assert!(off_deg > 0.0 && off_deg < 0.3, "{off_deg}");
     }
+}
 
-    // The map of the first stop has cells on either side, unlike that of one wedge, and none under the rover: it drives on
-    // assumed ground at first.
-    let sides = |hazard_cameras: Vec<CameraName>| {
-        let one = folder.path().join(format!("{hazard_cameras:?}").replace(['"', '[', ']', ',', ' '], ""));
-        let world = DrivenTraverse::begin(&scenario, &one, Cancel::default()).unwrap();
-        let command = DriveCommand { hazard_cameras, ..command.clone() };
-        let mut drive = begin(world, command.clone()).unwrap();
-        let pair = [&drive.steps[0].trace, &drive.steps[0].trace];
+#[test]
+fn two_wedges_show_the_ground_on_either_side_and_none_below_the_rover() {
+    let folder = tempfile::tempdir().unwrap();
+    let sides = |word: &str, hazard_cameras: Vec<CameraName>| {
+        let mut drive = begin(&scenario(), hazard_cameras, &folder.path().join(word));
+        let (command, pair) = (drive.command.clone(), [&drive.steps[0].trace, &drive.steps[0].trace]);
         let mapped = drive.maps.at(drive.world.traverse(), &command, pair, Cancel::default()).unwrap();
         let hazards = mapped.expect("the first stop has a map");
         let map = &hazards.map;
@@ -90,8 +91,8 @@ fn two_wedges_of_the_navcams_lead_round_a_rock() {
         let below = map.cell_at([0.0, 0.0]).unwrap().basis;
         (measured(-0.6), measured(0.6), below)
     };
-    let both = sides(vec![left, right]);
-    let one = sides(vec![left]);
+    let both = sides("both", ["left_wedge", "right_wedge"].map(name).to_vec());
+    let one = sides("one", vec![name("left_wedge")]);
     println!("{both:?} {one:?}");
     assert!(both.0 > 10 && both.1 > 10, "{both:?}");
     assert!(one.0 > 10 && one.1 == 0, "{one:?}");

@@ -301,7 +301,7 @@ impl DriveCommand {
     }
 
     /// The horizontal distance of the goal from the target, m, after so many actions after arrival were begun.
-    pub fn standoff_after_m(&self, actions: u32) -> f64 {
+    pub(crate) fn standoff_after_m(&self, actions: u32) -> f64 {
         let begun = &self.on_arrival[..(actions as usize).min(self.on_arrival.len())];
         if begun.contains(&ArrivalAction::Approach) { self.final_standoff_m } else { self.standoff_m }
     }

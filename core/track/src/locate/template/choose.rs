@@ -45,6 +45,13 @@ pub(super) struct Unmatched {
     pub(super) missing: TemplateFailure,
 }
 
+impl Unmatched {
+    /// No template was tried.
+    fn without_template() -> Self {
+        Self { scale_roll: None, missing: TemplateFailure::NoTemplate }
+    }
+}
+
 /// Takes points of the rover frame in which the current template was taken into the current rover frame.
 fn now_from_template(input: &LocateInput<'_>, memory: &TemplateMemory) -> Pose {
     input.site_from_rover.inverse() * memory.appearance.site_from_rover
@@ -76,7 +83,7 @@ pub(super) fn choose<'a>(
         let mut is_warped = false;
         for &preparation in &preparations {
             if input.cancel.is_requested() {
-                return Err(Unmatched { scale_roll: None, missing: TemplateFailure::NoTemplate });
+                return Err(Unmatched::without_template());
             }
             if preparation == Preparation::ScaleRoll && !is_warped {
                 // It is the window that was matched last.
@@ -114,8 +121,7 @@ pub(super) fn choose<'a>(
             let tried = if tried.len() > 1 { tried } else { Vec::new() };
             Ok(Chosen { tried, comparisons, ..best })
         }
-        (None, Some(unmatched)) => Err(unmatched),
-        (None, None) => Err(Unmatched { scale_roll: None, missing: TemplateFailure::NoTemplate }),
+        (None, unmatched) => Err(unmatched.unwrap_or_else(Unmatched::without_template)),
     }
 }
 
