@@ -14,7 +14,7 @@ use sightline_track::target::Designation;
 use sightline_world::{Scenario, choose_targets, library};
 
 fn scenario() -> Scenario {
-    let mut scenario = Scenario { seed: 3006, ..library::scenario("navcam-wedges").unwrap() };
+    let mut scenario = Scenario { seed: 3012, ..library::scenario("navcam-wedges").unwrap() };
     (scenario.camera.image_size, scenario.camera.samples_per_axis) = (256, 2);
     scenario.targets.window_px = 9;
     (scenario.drive.start_distance_m, scenario.drive.end_distance_m) = (8.0, 2.0);
