@@ -342,7 +342,9 @@ impl Candidates {
     fn refine(&self, sub_pixel: bool) -> Option<Best> {
         let (index, score) = self.highest()?;
         let (column, row) = (index / self.rows, index % self.rows);
-        let at_end = column == 0 || column + 1 == self.columns;
+        // Beyond a window that reaches out of the image a better one may lie, too.
+        let is_cut = |column: usize| self.scores[column * self.rows + row].is_nan();
+        let at_end = column == 0 || column + 1 == self.columns || is_cut(column - 1) || is_cut(column + 1);
         let mut best =
             Best { along: self.along(column), across: self.across(row), score: f64::from(score), at_end };
         if sub_pixel && !at_end {
