@@ -1,4 +1,4 @@
-//! Tests of drive commands: what is refused, and what older files have.
+//! Tests of drive commands: values that are refused, and files of earlier versions.
 
 use super::*;
 

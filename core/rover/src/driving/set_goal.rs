@@ -3,7 +3,9 @@
 //! ```text
 //! goal = target + standoff · (start − target)/|start − target| + offset      horizontally, site frame
 //! ```
-//! `start` is the rover at the time of the command, and `standoff` the final one once an approach after arrival has begun. Frame: site, m. Source: papers.md R6, R7.
+//! `start` is the rover at the time of the command, and `standoff` the final one once an approach after arrival has begun.
+//!
+//! Frame: site, m. Source: papers.md R6, R7.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;

@@ -204,7 +204,7 @@ fn without_a_slope_from_the_neighbours_that_of_an_earlier_stop_serves() {
         let [facing, found] = [input, carried].map(|input| point_stereo(&input, &settings).unwrap());
         assert!(found.score >= facing.score, "seed {seed}");
         assert!(found.right_pixel.distance(scene.true_right) < 0.2, "seed {seed}");
-        // What was not measured here tells nothing of the error where it matches no better.
+        // A carried slope is used for the error only where its windows score higher.
         let slope = (found.right_from_left - facing.right_from_left).amax();
         assert_eq!(slope > 0.0, found.score > facing.score, "seed {seed}: {slope}");
         (facing_misses, carried_misses) =
