@@ -13,6 +13,14 @@ async fn the_page_shows_ground_paths_and_votes_of_a_drive_that_avoids_a_rock() {
     browser.show_panel("Drive").await;
     browser.click_on("combobox", "navigator").await;
     browser.choose("hazard avoidance, gestalt").await;
+    // The map is made from a pair that is named, and the rover goes on from the goal towards the target.
+    browser.resize(1600, 1200).await;
+    browser.click_on("button", "tracked stops, odometry, offset, limits").await;
+    browser.click_on("checkbox", "front_hazcam").await;
+    browser.click_on("checkbox", "approach on arrival").await;
+    browser.set_value("spinbutton", "final standoff", "1.6").await;
+    browser.shot("hazards-form").await;
+    browser.click_on("button", "tracked stops, odometry, offset, limits").await;
     browser.click_on("button", "Drive").await;
     browser.wait_status("the drive", "s.session === 's2' && s.drive === 'drives'").await;
     let is_vetoed = |cycle: &Value| {
@@ -57,7 +65,12 @@ async fn the_page_shows_ground_paths_and_votes_of_a_drive_that_avoids_a_rock() {
     browser.wait_status("the arrival", "s.drive === 'arrived'").await;
     browser.says("arrived: ").await;
     browser.shot("hazards-arrived").await;
-    let summary = bench.json("/api/v1/sessions/s2/drive")["summary"].clone();
+    let drive = bench.json("/api/v1/sessions/s2/drive");
+    let command = &drive["steering"]["command"];
+    assert_eq!(command["hazard_cameras"], serde_json::json!(["front_hazcam"]), "{command}");
+    assert_eq!(command["on_arrival"], serde_json::json!(["approach"]), "{command}");
+    assert_eq!(command["final_standoff_m"], 1.6, "{command}");
+    let summary = &drive["summary"];
     assert_eq!(summary["collisions"], 0, "{summary}");
     assert!(summary["target_error_m"].as_f64().unwrap() < 0.05, "{summary}");
     browser.end().await;

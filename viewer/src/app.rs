@@ -2,6 +2,7 @@
 
 use egui::{CentralPanel, Context, Frame, Margin, Panel, Ui};
 
+use crate::access::press;
 use crate::command::Command;
 use crate::command::keys;
 use crate::command::{help, palette};
@@ -346,6 +347,7 @@ impl SightlineApp {
 
 impl eframe::App for SightlineApp {
     fn logic(&mut self, context: &Context, _frame: &mut eframe::Frame) {
+        press::limit(context);
         self.exchange(context);
     }
 

@@ -213,7 +213,7 @@ impl Drive {
         }
         let mut scenario = open::scenario(&self.scenario)?;
         scenario.seed = self.seed.unwrap_or(scenario.seed);
-        let scenario = simulate::with(&scenario, &self.world)?;
+        let scenario = simulate::with(&scenario, "--world", &self.world)?;
         let settings = self.settings()?;
         self.command().validate()?;
         let temporary =

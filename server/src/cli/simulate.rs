@@ -43,7 +43,7 @@ impl Simulate {
     pub(super) fn run(self) -> Result<()> {
         let mut scenario = self.scenario.as_deref().map_or_else(|| Ok(Scenario::demo()), open::scenario)?;
         scenario.seed = self.seed.unwrap_or(scenario.seed);
-        let scenario = with(&scenario, &self.set)?;
+        let scenario = with(&scenario, "--set", &self.set)?;
         let traverse = create_simulated(&scenario, &self.out)?;
         open::render(&traverse)?;
         if self.truth {
@@ -69,8 +69,8 @@ fn write_truth(traverse: &Traverse) -> Result<()> {
     Ok(())
 }
 
-/// The scenario with settings changed by name.
-pub(super) fn with(scenario: &Scenario, changes: &[String]) -> Result<Scenario> {
+/// The scenario with settings changed by name; errors name the `option` that changes them.
+pub(super) fn with(scenario: &Scenario, option: &str, changes: &[String]) -> Result<Scenario> {
     let mut document: toml::Table =
         toml::from_str(&scenario.to_toml()).map_err(|error| Error::Request(error.to_string()))?;
     for change in changes {
@@ -79,7 +79,7 @@ pub(super) fn with(scenario: &Scenario, changes: &[String]) -> Result<Scenario> 
         })?;
         set(&mut document, key.trim(), value.trim())?;
     }
-    Scenario::from_toml(&document.to_string(), Path::new("--set"))
+    Scenario::from_toml(&document.to_string(), Path::new(option))
 }
 
 /// Gives a setting a value; a whole number may stand for one with a fraction.
@@ -123,11 +123,12 @@ mod tests {
     #[test]
     fn settings_of_a_scenario_change_by_name() {
         let changes = ["sun.elevation_deg=20".to_owned(), "name = two words".to_owned()];
-        let changed = with(&Scenario::demo(), &changes).unwrap();
+        let changed = with(&Scenario::demo(), "--set", &changes).unwrap();
         assert_eq!((changed.sun.elevation_deg, changed.name.as_str()), (20.0, "two words"));
         assert_eq!(changed.rocks, Scenario::demo().rocks);
         // The demonstration hands nothing over, so that its document does not name the setting.
-        let handed_over = with(&Scenario::demo(), &["camera.hand_over=mer_front_hazcam".to_owned()]).unwrap();
+        let handed_over =
+            with(&Scenario::demo(), "--set", &["camera.hand_over=mer_front_hazcam".to_owned()]).unwrap();
         assert_eq!(handed_over.camera.hand_over, Some(CameraRig::MerFrontHazcam));
     }
 
@@ -136,10 +137,11 @@ mod tests {
         for (change, named) in
             [("sun.height=3", "sun.height"), ("sun=3", "sun"), ("a.b=1", "a.b"), ("seed", "key=value")]
         {
-            let message = with(&Scenario::demo(), &[change.to_owned()]).unwrap_err().to_string();
+            let message = with(&Scenario::demo(), "--set", &[change.to_owned()]).unwrap_err().to_string();
             assert!(message.contains(named), "{message}");
         }
-        let message = with(&Scenario::demo(), &["sun.elevation_deg=-3".to_owned()]).unwrap_err().to_string();
+        let message =
+            with(&Scenario::demo(), "--set", &["sun.elevation_deg=-3".to_owned()]).unwrap_err().to_string();
         assert!(message.contains("sun.elevation_deg"), "{message}");
     }
 }

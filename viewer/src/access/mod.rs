@@ -16,3 +16,4 @@ pub(crate) mod dom;
 pub(crate) mod mirror;
 #[cfg(any(test, target_arch = "wasm32"))]
 pub(crate) mod outline;
+pub(crate) mod press;

@@ -5,6 +5,7 @@ pub(crate) mod faults;
 pub(crate) mod ground;
 pub(crate) mod hazards;
 pub(crate) mod map;
+mod map_pairs;
 mod motions;
 pub(crate) mod panel;
 pub(crate) mod paths;

@@ -10,7 +10,7 @@ use sightline_session::pause::PauseSide;
 use sightline_track::cycle_stage::CycleStage;
 
 use crate::command::{Command, Go};
-use crate::driving::{Ask, faults, motions, pause, visits, why, words};
+use crate::driving::{Ask, faults, map_pairs, motions, pause, visits, why, words};
 use crate::panels::digits;
 use crate::panels::panel::Panel;
 use crate::state::{State, run_letter};
@@ -109,14 +109,14 @@ fn form(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     CollapsingHeader::new(theme::label("tracked stops, odometry, offset, limits"))
         .id_salt("drive limits")
         .show(ui, |ui| {
-            limits(ui, &mut command);
+            limits(ui, state, &mut command);
         });
     if command != state.driving.command {
         out.push(Command::Drive(Ask::Form(command)));
     }
 }
 
-fn limits(ui: &mut Ui, command: &mut DriveCommand) {
+fn limits(ui: &mut Ui, state: &State, command: &mut DriveCommand) {
     ui.horizontal_wrapped(|ui| {
         let [north, east] = &mut command.offset_m;
         number(ui, "offset north", " m", north, (-20.0, 20.0), "Added to the goal");
@@ -155,6 +155,7 @@ fn limits(ui: &mut Ui, command: &mut DriveCommand) {
         number(ui, "tilt", "°", &mut command.tilt_max_deg, (1.0, 45.0), "Largest tilt after a step");
         let help = "Hazards nearer to the target than this are ignored, so that a large rock can be approached";
         number(ui, "exemption", " m", &mut command.exemption_radius_m, (0.0, 5.0), help);
+        map_pairs::field(ui, state, command);
         number(ui, "time", " min", &mut command.flight_minutes_max, (1.0, 10_000.0), "Time on Mars");
     });
 }

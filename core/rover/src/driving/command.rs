@@ -100,7 +100,7 @@ pub enum ArrivalAction {
 }
 
 /// Most pairs of the hazard map.
-const HAZARD_CAMERAS_MAX: usize = 4;
+pub const HAZARD_CAMERAS_MAX: usize = 4;
 
 /// Most actions after arrival.
 const ACTIONS_MAX: usize = 10;

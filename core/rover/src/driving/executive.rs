@@ -251,7 +251,7 @@ fn choose_motion(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &mut Cycle, t
         let target_in_rover = stops.site_from_rover(cycle.step).inverse_transform_point(target_in_site);
         let distance_m = (target_in_rover - stops.cameras(cycle.step).0.model.centre()).norm();
         next_motion::choose(stops, input, cycle, distance_m);
-        if cycle.choice.is_some() {
+        if input.hazards.is_some_and(|hazards| hazards.point_count().is_some()) {
             let before_s = cycle.flight.total_s();
             cycle.flight = cycle.flight.with_hazards();
             cycle.flight_minutes += (cycle.flight.total_s() - before_s) / 60.0;

@@ -58,23 +58,19 @@ impl StopHazards {
 /// The pairs of the hazard map of a command, at the stop of the designation; none for a navigator without a map.
 ///
 /// # Errors
-/// [`Error::Setting`] for a stop without such a pair.
+/// [`Error::Setting`] for a stop without such a pair, or without one that the command names.
 pub fn hazard_cameras(stops: &dyn Stops, step: usize, command: &DriveCommand) -> Result<Vec<CameraName>> {
-    if !command.navigator.needs_map() {
-        return Ok(Vec::new());
-    }
-    if command.hazard_cameras.is_empty() {
-        return Ok(vec![body_pair(stops, step, command)?]);
-    }
     let cameras = stops.further_cameras(step);
     let is_pair =
         |name: CameraName| cameras.iter().any(|camera| camera.name == name && camera.right.is_some());
-    match command.hazard_cameras.iter().find(|name| !is_pair(**name)) {
-        None => Ok(command.hazard_cameras.clone()),
-        Some(name) => {
-            let problem = format!("stop {step} has no pair `{name}`; {}", choices(&cameras));
-            Err(Error::setting("hazard_cameras", problem))
-        }
+    if let Some(name) = command.hazard_cameras.iter().find(|name| !is_pair(**name)) {
+        let problem = format!("stop {step} has no pair `{name}`; {}", choices(&cameras));
+        return Err(Error::setting("hazard_cameras", problem));
+    }
+    match command.navigator.needs_map() {
+        false => Ok(Vec::new()),
+        true if command.hazard_cameras.is_empty() => Ok(vec![body_pair(stops, step, command)?]),
+        true => Ok(command.hazard_cameras.clone()),
     }
 }
 

@@ -21,7 +21,9 @@ pub mod select_path;
 pub mod set_goal;
 
 pub use active_world::{ActiveWorld, DriveReport, FollowedCycle, Stall};
-pub use command::{ArrivalAction, DriveCommand, GoalRule, NavigatorKind, SlipCheck, TrackedStops};
+pub use command::{
+    ArrivalAction, DriveCommand, GoalRule, HAZARD_CAMERAS_MAX, NavigatorKind, SlipCheck, TrackedStops,
+};
 pub use dead_reckoning::Reckoned;
 pub use ending::{Ending, StopReason};
 pub use executive::Cycle;

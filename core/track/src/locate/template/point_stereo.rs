@@ -87,7 +87,7 @@ pub struct PointStereo {
 }
 
 /// A slope that stretches the window by more than this is not believed, px per px.
-const STRETCH_LIMIT: f64 = 1.0;
+pub(super) const STRETCH_LIMIT: f64 = 1.0;
 
 /// Finds the left pixel's point in the right image.
 ///

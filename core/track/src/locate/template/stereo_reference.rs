@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::locate::template::match_noise::match_noise;
+use crate::locate::template::point_stereo::STRETCH_LIMIT;
 use crate::locate::template::stereo_curve::CurveInput;
 use sightline_vision::correlate::zncc::zncc;
 use sightline_vision::image::patch;
@@ -137,7 +138,7 @@ pub(super) fn answer(input: &StereoInput<'_>, settings: &TemplateSettings) -> Op
     let mut best = facing.in_focus(interval, best?);
     let slope = slope(&curve, best.along, input, settings);
     let mut windows = facing;
-    if let Some(slope) = slope.filter(|slope| slope.norm() <= 1.0 && !best.at_end) {
+    if let Some(slope) = slope.filter(|slope| slope.norm() <= STRETCH_LIMIT && !best.at_end) {
         let on_surface = Direct { slope, ..facing };
         let near = ((best.along - 5.0).max(interval.0), (best.along + 5.0).min(interval.1));
         let again = on_surface.search(near).1;

@@ -261,3 +261,17 @@ fn the_score_between_candidates_is_at_most_one() {
     assert!(best.along > 1.0);
     assert_eq!(best.score, 1.0);
 }
+
+#[test]
+fn a_match_beside_a_window_that_leaves_the_image_is_at_the_end() {
+    // The best column is the middle one of seven.
+    let of_column = [0.1, 0.2, 0.5, 0.9, 0.5, 0.2, 0.1];
+    for (outside, is_at_end) in [(0, false), (1, false), (2, true), (4, true), (5, false)] {
+        let mut candidates = Candidates::new((0.0, 6.0), 0.0);
+        let rows = candidates.rows;
+        candidates.scores = of_column.iter().flat_map(|score| vec![*score; rows]).collect();
+        candidates.scores[outside * rows..(outside + 1) * rows].fill(f32::NAN);
+        let best = candidates.refine(false).unwrap();
+        assert_eq!((best.along, best.at_end), (3.0, is_at_end), "column {outside} is outside");
+    }
+}
