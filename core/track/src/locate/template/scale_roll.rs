@@ -46,8 +46,9 @@ use sightline_vision::image::patch::{self, Patch};
 /// Length of the helper vector, m (K-Eq 10).
 const HELPER_LENGTH_M: f64 = 0.05;
 
-/// A slope that stretches the template by more than this beside scale and roll is not believed, px per px.
-const STRETCH_LIMIT: f64 = 0.5;
+/// A slope that stretches the template by more than this beside scale and roll is not believed, px per px. The window that is
+/// only scaled and rolled is compared, too, so that the limit merely leaves out slopes that were measured wrongly.
+const STRETCH_LIMIT: f64 = 1.0;
 
 /// A template is scaled by at most this, and by at least its inverse.
 ///
