@@ -35,7 +35,7 @@ fn main() {
 const STOP: usize = 4;
 
 /// A planned drive among rocks with hazcams; its images are rendered at the first call and kept in the folder.
-fn recording(size: u32, folder: &Path) -> Traverse {
+fn recording(size: u32, folder: &Path) -> (Traverse, Scenario) {
     let mut scenario: Scenario = library::scenario("obstacles-10").expect("a scenario of the library");
     scenario.seed = 3000;
     (scenario.camera.image_size, scenario.camera.samples_per_axis) = (size, 2);
@@ -43,15 +43,16 @@ fn recording(size: u32, folder: &Path) -> Traverse {
         rig.image_size = 256;
     }
     (scenario.drive.start_distance_m, scenario.drive.end_distance_m) = (8.0, 4.0);
-    create_simulated(&scenario, folder).expect("a drive")
+    (create_simulated(&scenario, folder).expect("a drive"), scenario)
 }
 
 /// The drive at the stop before the one that is measured.
 fn drive_to_stop(path: &Path, size: u32) -> (&'static Traverse, ReplayedDrive<'static>) {
     // The drive refers to the recording; a benchmark has few samples.
-    let traverse: &'static Traverse = Box::leak(Box::new(recording(size, path)));
-    let (world, scenario) = (traverse.world().expect("a world"), traverse.scenario().expect("a scenario"));
-    let designation = Designation::new(0, choose_targets(world, scenario, traverse.index())[0]);
+    let (traverse, scenario) = recording(size, path);
+    let traverse: &'static Traverse = Box::leak(Box::new(traverse));
+    let world = traverse.world().expect("a world");
+    let designation = Designation::new(0, choose_targets(world, &scenario, traverse.index())[0]);
     let command = DriveCommand { navigator: NavigatorKind::Gestalt, ..DriveCommand::default() };
     let (settings, cancel) = (Settings::default(), Cancel::default());
     let mut drive = ReplayedDrive::begin(traverse, designation, command, &settings, cancel).expect("a drive");

@@ -352,4 +352,14 @@ mod tests {
             geometry(&target, &navcam(), &now_from_then, &navcam(), RollReference::OldImage).unwrap();
         assert!(((roll - against_old).to_degrees() + 0.0237861221).abs() < 1e-6);
     }
+
+    /// A face that turns away while the rover comes nearer: at half a pixel per pixel its template is still of use.
+    #[test]
+    fn a_template_is_warped_by_slopes_of_up_to_one_pixel_per_pixel() {
+        let similarity = Rotation2::new(0.3).into_inner() * 1.38;
+        for (slope, is_warped) in [(0.0, true), (0.7, true), (0.99, true), (1.01, false)] {
+            let stretched = Matrix2::new(1.0, slope, 0.0, 1.0) * similarity;
+            assert_eq!(is_believed(&stretched, &similarity), is_warped, "slope {slope}");
+        }
+    }
 }
