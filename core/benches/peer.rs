@@ -19,6 +19,7 @@
 
 use std::hint::black_box;
 use std::io::{BufRead, Write};
+use std::path::Path;
 use std::time::Instant;
 
 use sightline_vision::correlate::{PixelRect, zncc_surface};
@@ -27,7 +28,8 @@ use sightline_vision::sift::{Descriptor, SiftSettings, detect, nearest};
 use sightline_vision::stereo::{StereoMethod, StereoSettings, disparities};
 
 fn main() {
-    let Some(path) = std::env::args().nth(1).filter(|argument| !argument.starts_with('-')) else { return };
+    // Cargo passes its own options and the name of a benchmark.
+    let Some(path) = std::env::args().nth(1).filter(|argument| Path::new(argument).is_file()) else { return };
     let images = read_images(&std::fs::read(path).expect("the file of pixels can be read"));
     // The pool of one is this thread itself, so that no time goes into handing over.
     let _pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();

@@ -25,6 +25,7 @@ use sightline_rover::visual_odometry::{OdometryInput, OdometryPreset, OdometryVi
 use sightline_session::replayed_drive::ReplayedDrive;
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
+use sightline_world::scenario::{CameraRig, FurtherRig};
 use sightline_world::{Scenario, choose_targets, library};
 
 fn main() {
@@ -34,15 +35,14 @@ fn main() {
 /// The stop that is measured: some stops after the designation, when the map has grown.
 const STOP: usize = 4;
 
-/// A planned drive among rocks with hazcams; its images are rendered at the first call and kept in the folder.
+/// A planned drive with hazcams; its images are rendered at the first call and kept in the folder.
 fn recording(size: u32, folder: &Path) -> (Traverse, Scenario) {
-    let mut scenario: Scenario = library::scenario("obstacles-10").expect("a scenario of the library");
-    scenario.seed = 3000;
+    let mut scenario = library::scenario("approach-10").expect("a scenario of the library");
+    let name = "front_hazcam".parse().expect("a name");
+    (scenario.seed, scenario.targets.window_px) = (67_000, 11);
     (scenario.camera.image_size, scenario.camera.samples_per_axis) = (size, 2);
-    for rig in &mut scenario.camera.further {
-        rig.image_size = 256;
-    }
-    (scenario.drive.start_distance_m, scenario.drive.end_distance_m) = (8.0, 4.0);
+    scenario.camera.further =
+        vec![FurtherRig { name, rig: CameraRig::MerFrontHazcam, look_deg: None, image_size: 256 }];
     (create_simulated(&scenario, folder).expect("a drive"), scenario)
 }
 
