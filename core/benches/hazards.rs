@@ -13,7 +13,7 @@
 //! | clearance | 2 × 2 passes over 25,600 cells | 0.5 ms |
 //! | route | 25,600 cells from a heap, some 100 ns each | 2.5 ms |
 //! | paths | 24 paths × 24 samples × 2 discs | 0.1 ms |
-//! | way | 30 to 12,000 stances × 8 motions × 12 samples, 10 ns each | 0.03 to 12 ms |
+//! | way | 30 to 6,000 stances × 4 motions that lower a sum × 12 samples, 10 ns each; the heap | 0.02 to 4 ms |
 //!
 //! Run with `cargo bench -p sightline-core --profile dev --bench hazards` (the profile `dev` is optimised); measured times:
 //! `docs/benchmarks.md`.
@@ -132,21 +132,41 @@ fn path(bencher: Bencher<'_, '_>) {
     bencher.bench_local(|| navigator.select_path(&input));
 }
 
-/// A path where no way leads to the goal: a wall encloses it, and the search goes on elsewhere.
+/// A path where a closed wall encloses the goal.
 #[divan::bench]
 fn path_to_an_enclosed_goal(bencher: Bencher<'_, '_>) {
+    let is_wall = |x: f64, y: f64| (1.4..1.9).contains(&x.hypot(y));
+    bench_path_among_walls(bencher, is_wall);
+}
+
+/// A path where the only way out of the goal's place has a corner that the rover cannot turn in: the search ends at its limit.
+#[divan::bench]
+fn path_to_a_goal_behind_a_narrow_corner(bencher: Bencher<'_, '_>) {
+    let is_free = |x: f64, y: f64| {
+        let is_in = |x_range: [f64; 2], y_range: [f64; 2]| {
+            (x_range[0]..x_range[1]).contains(&x) && (y_range[0]..y_range[1]).contains(&y)
+        };
+        is_in([-0.95, 0.95], [-0.95, 2.5]) || is_in([-5.0, 0.95], [0.6, 2.5])
+    };
+    bench_path_among_walls(bencher, |x, y| x > -3.0 && !is_free(x, y));
+}
+
+/// A path to the goal of `input`, with walls at places relative to it, x and y of the rover frame, m.
+fn bench_path_among_walls(bencher: Bencher<'_, '_>, is_wall: impl Fn(f64, f64) -> bool) {
     let scene = scene();
     let pose = scene.world.traverse().site_from_rover(0);
     let mut points = scene.points();
     for (row, column) in (-50..50).flat_map(|row| (-50..50).map(move |column| (row, column))) {
         let (x, y) = (0.06 * f64::from(row), 0.06 * f64::from(column));
-        let height_m = if (1.4..1.9).contains(&x.hypot(y)) { 0.8 } else { 0.0 };
+        let height_m = if is_wall(x, y) { 0.8 } else { 0.0 };
         points.push(Point3::new(6.0 + x, 1.0 + y, 0.3 - height_m));
     }
     let map = scene.goodness(&scene.hazards(&points, None), &pose);
     let input = input(&map, &pose);
     let navigator = HazardNavigator::default();
-    assert!(navigator.select_path(&input).blocked_goal.is_some());
+    let choice = navigator.select_path(&input);
+    let goal = choice.blocked_goal.expect("an enclosed goal");
+    assert!(goal.ground.is_none() && goal.nearest_m.is_some() && choice.motion().is_some(), "{goal:?}");
     bencher.bench_local(|| navigator.select_path(&input));
 }
 

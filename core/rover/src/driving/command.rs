@@ -307,7 +307,7 @@ impl DriveCommand {
     }
 
     /// Whether the rover is on its way to the final standoff after so many actions, if it is not at its goal.
-    pub(crate) fn is_approach(&self, actions: u32) -> bool {
+    pub fn is_approach(&self, actions: u32) -> bool {
         let last = (actions as usize).checked_sub(1).and_then(|last| self.on_arrival.get(last));
         last == Some(&ArrivalAction::Approach)
     }

@@ -34,8 +34,8 @@ impl Grid {
     /// Row and column of the cell at a position, site frame, m; `None` outside.
     pub(super) fn cell_at(&self, at_m: [f64; 2]) -> Option<[usize; 2]> {
         let within = |axis: usize| {
-            let number = (at_m[axis] / self.cell_m).floor() - self.first[axis] as f64;
-            (number >= 0.0 && number < self.side as f64).then_some(number as usize)
+            let number = floor(at_m[axis] / self.cell_m).saturating_sub(self.first[axis]);
+            (0..self.side as i64).contains(&number).then_some(number as usize)
         };
         Some([within(0)?, within(1)?])
     }
@@ -101,6 +101,12 @@ impl Disc {
     }
 }
 
+/// ⌊x⌋, without the call that `f64::floor` is on processors without SSE 4.1.
+fn floor(x: f64) -> i64 {
+    let towards_zero = x as i64;
+    towards_zero.saturating_sub(i64::from(x < towards_zero as f64))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -130,5 +136,12 @@ mod tests {
         let disc = Disc::new(2.0);
         assert_eq!((disc.rows(), disc.count()), (2, 13));
         assert_eq!([-3, -2, -1, 0].map(|row| disc.half_width(row)), [None, Some(0), Some(1), Some(2)]);
+    }
+
+    #[test]
+    fn floor_is_that_of_the_library() {
+        for x in [-3.5, -3.0, -0.1, -0.0, 0.0, 0.3 / 0.1, 0.9, 2.0, 7.999_999_999, 1e300, -1e300, f64::NAN] {
+            assert_eq!(floor(x), x.floor() as i64, "{x}");
+        }
     }
 }

@@ -69,6 +69,16 @@ impl<'a> Ground<'a> {
         self.spot_of(index)
     }
 
+    /// Whether a term of a cell exceeds its limit.
+    pub(super) fn is_bad(&self, index: usize) -> bool {
+        self.clearance_m[index] < 0.0
+    }
+
+    /// Whether the ground at a position, site frame, m, is bad; not outside the window.
+    pub(super) fn is_bad_at(&self, at_m: [f64; 2]) -> bool {
+        self.map.grid.index_at(at_m).is_some_and(|index| self.is_bad(index))
+    }
+
     /// The ground of a cell.
     pub(super) fn spot_of(&self, index: usize) -> Spot {
         let clearance_m = f64::from(self.clearance_m[index]);

@@ -11,7 +11,10 @@
 //! | `path` | footprint along a path, its veto and its hazard |
 //! | `navigator` | candidates, votes, choice |
 //! | `stand` | whether the rover can stand at its goal, and the nearest place where it can |
-//! | `way` | way to the goal: a search over positions and headings |
+//! | `reachable` | cells that no closed bad ground separates from the rover |
+//! | `moves` | motions of the search: footprint and cost |
+//! | `search` | search for a way, over positions and headings |
+//! | `way` | the motions of a way, and what the rover follows of it |
 //! | `clear_way` | whether the way of an approach after arrival is clear |
 //! | `counterfactual` | smallest change of a limit that opens paths |
 //!
@@ -23,7 +26,10 @@ mod ground;
 mod route;
 mod path;
 pub mod navigator;
+mod reachable;
 pub mod stand;
+mod moves;
+mod search;
 mod way;
 pub(crate) mod clear_way;
 pub mod counterfactual;
@@ -34,5 +40,5 @@ mod drive_tests;
 
 pub use counterfactual::{LimitChange, counterfactual};
 pub use navigator::HazardNavigator;
+pub use search::way;
 pub use settings::{NavigatorPreset, NavigatorSettings};
-pub use way::way;

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! aim          the goal, or the nearest place to it where the rover can stand (`stand.rs`)
-//! manoeuvre    the turn or motion backwards with which the way to the aim (`way.rs`) begins; it is chosen
+//! manoeuvre    the turn or motion backwards with which the way to the aim (`search.rs`) begins; it is chosen
 //! candidates   `curvature_count` arcs, and the arc or turn to a point `look_ahead_m` along the way
 //!              if that turn is vetoed: an arc backwards to that point
 //!              if none passes: a turn to either side, the least multiple of `turn_deg` after which an arc passes
@@ -34,16 +34,22 @@ use crate::hazards::goodness::GoodnessMap;
 use super::counterfactual::{LimitChange, counterfactual};
 use super::ground::Ground;
 use super::limits::VetoLimits;
+use super::moves::Moves;
 use super::path::{Path, Stance};
 use super::route::Route;
+use super::search::{self, Found, Search};
 use super::settings::NavigatorSettings;
 use super::stand::Aim;
-use super::way::{self, STANCES_MAX, Search, Way};
+use super::way::Way;
 
 /// Nearer to the end of the way's first part than this a path has arrived: its heading does not matter, m.
 const AT_END_M: f64 = 0.02;
 /// A path of less agreement with the way leads away from it.
 const GOAL_MIN: f64 = 0.1;
+/// Stances from which a way is searched, before the goal is examined for being enclosed.
+const STANCES_MAX: usize = 6000;
+/// A pocket that encloses a goal has fewer stances.
+const POCKET_STANCES_MAX: usize = 1500;
 
 /// A navigator that avoids the hazards of a goodness map.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -71,11 +77,12 @@ impl HazardNavigator {
         let ground = Ground::new(map, VetoLimits::new(&map.settings, settings));
         let start = Stance::of(input.site_from_rover);
         let goal_m = start.place(input.goal_m);
+        let moves = Moves::new(&ground, settings);
         let mut decision =
             Decision { settings, ground: &ground, input, start, aim_m: goal_m, route: None, way: None };
-        let mut aim = Aim::of(&ground, goal_m, settings.reach_m);
+        let mut aim = Aim::of(&moves, start.at_m, goal_m);
         if settings.has_route {
-            aim = decision.find_way(aim);
+            aim = decision.find_way(&moves, aim);
         } else {
             decision.aim_m = aim.at_m;
         }
@@ -138,25 +145,27 @@ struct Decision<'a> {
 
 impl<'a> Decision<'a> {
     /// Sets route and way to an aim; where no way leads there, to the nearest place that one leads to.
-    fn find_way(&mut self, mut aim: Aim<'a>) -> Aim<'a> {
+    fn find_way(&mut self, moves: &Moves<'_>, mut aim: Aim<'a>) -> Aim<'a> {
         loop {
             self.aim_m = aim.at_m;
             let route = Route::new(self.ground, aim.at_m, self.settings);
-            let found = Way::search(&route, self.start, self.settings, STANCES_MAX);
-            let is_unfinished = matches!(found, Search::Unfinished);
-            let pocket = is_unfinished.then(|| way::pocket(&route, &self.start, self.settings)).flatten();
+            let found = Search::new(moves, &route, self.start).run(STANCES_MAX);
+            let is_unfinished = matches!(found, Found::Unfinished);
+            let pocket = is_unfinished
+                .then(|| search::pocket(moves, aim.at_m, self.start.at_m, POCKET_STANCES_MAX))
+                .flatten();
             self.route = Some(route);
             if let Some(other) = pocket.and_then(|pocket| aim.outside(&pocket)) {
                 aim = other;
                 continue;
             }
-            if let Search::Nearest(way) = &found {
+            if let Found::Nearest(way) = &found {
                 self.aim_m = way.end();
                 aim = aim.replaced_by(way.end());
             }
             self.way = match found {
-                Search::Found(way) | Search::Nearest(way) => Some(way),
-                Search::Unfinished => None,
+                Found::Goal(way) | Found::Nearest(way) => Some(way),
+                Found::Unfinished => None,
             };
             return aim;
         }

@@ -23,7 +23,7 @@
 
 use crate::driving::motion::Motion;
 use crate::driving::path_choice::Veto;
-use crate::hazards::goodness::{CellBasis, HazardTerm};
+use crate::hazards::goodness::{CellBasis, GoodnessCell, HazardTerm};
 use sightline_geometry::frames::Pose;
 
 use super::ground::{Ground, Spot};
@@ -77,13 +77,34 @@ impl Stance {
     }
 }
 
-/// A disc of the footprint at one place of a path.
+/// A disc of the footprint at one place of a motion.
 #[derive(Clone, Copy, Debug)]
-struct Sample {
-    /// Number of the disc: the first is that at the rover's origin.
-    disc: usize,
+pub(super) struct Disc {
+    /// Its number: the first is that at the rover's origin.
+    pub(super) number: usize,
     along_m: f64,
     is_driven: bool,
+    /// Ahead and to the right of the start of the motion, m.
+    pub(super) place_m: [f64; 2],
+}
+
+/// The footprint along a motion, the same for every start.
+pub(super) struct Footprint {
+    pub(super) motion: Motion,
+    /// Where the rover is after it: ahead and to the right of its start, m, and turned to the right, rad.
+    pub(super) moved: ([f64; 2], f64),
+    /// Distances of the discs ahead of the rover's origin, m.
+    offsets_m: Vec<f64>,
+    /// In the order of the distance.
+    pub(super) discs: Vec<Disc>,
+    /// Length over which the hazard is evaluated, m; 0 of a turn.
+    evaluated_m: f64,
+}
+
+/// The ground under a disc.
+#[derive(Clone, Copy, Debug)]
+struct Sample {
+    disc: Disc,
     at_m: [f64; 2],
     spot: Spot,
 }
@@ -103,6 +124,36 @@ pub(super) struct Path<'a> {
     pub(super) evaluated_m: f64,
 }
 
+impl Footprint {
+    /// The footprint of a motion, evaluated over at least `evaluated_min_m` of an arc.
+    pub(super) fn new(motion: &Motion, evaluated_min_m: f64, settings: &NavigatorSettings) -> Self {
+        let offsets_m = offsets(motion, settings.reach_m);
+        let (parts, evaluated_m) = parts(motion, evaluated_min_m, settings);
+        let length_m = match motion {
+            Motion::Arc { length_m, .. } => length_m.abs(),
+            Motion::Turn { .. } => 0.0,
+        };
+        let start = Stance { at_m: [0.0; 2], heading_rad: 0.0 };
+        let discs = parts
+            .into_iter()
+            .flat_map(|part| {
+                let stance = start.after(motion, part);
+                offsets_m.iter().enumerate().map(move |(number, ahead)| Disc {
+                    number,
+                    along_m: part * length_m,
+                    is_driven: part <= 1.0,
+                    place_m: stance.place([*ahead, 0.0]),
+                })
+            })
+            .collect();
+        Self { motion: *motion, moved: motion.after(1.0), offsets_m, discs, evaluated_m }
+    }
+
+    pub(super) fn is_backwards(&self) -> bool {
+        matches!(self.motion, Motion::Arc { length_m, .. } if length_m < 0.0)
+    }
+}
+
 impl<'a> Path<'a> {
     /// The path of a motion, evaluated over at least `evaluated_min_m` of an arc.
     pub(super) fn new(
@@ -112,46 +163,47 @@ impl<'a> Path<'a> {
         evaluated_min_m: f64,
         settings: &'a NavigatorSettings,
     ) -> Self {
-        let offsets = offsets(motion, settings.reach_m);
-        let discs = |stance: Stance| offsets.iter().map(move |ahead| stance.place([*ahead, 0.0])).enumerate();
+        Self::along(ground, start, &Footprint::new(motion, evaluated_min_m, settings), settings)
+    }
+
+    /// The path of a footprint.
+    pub(super) fn along(
+        ground: &'a Ground<'a>,
+        start: &Stance,
+        footprint: &Footprint,
+        settings: &'a NavigatorSettings,
+    ) -> Self {
         let mut start_m = [f64::INFINITY; 3];
-        for (disc, at_m) in discs(*start) {
-            start_m[disc] = ground.spot(at_m).clearance_m;
+        for (clearance_m, ahead) in start_m.iter_mut().zip(&footprint.offsets_m) {
+            *clearance_m = ground.spot(start.place([*ahead, 0.0])).clearance_m;
         }
-        let (parts, evaluated_m) = parts(motion, evaluated_min_m, settings);
-        let length_m = match motion {
-            Motion::Arc { length_m, .. } => length_m.abs(),
-            Motion::Turn { .. } => 0.0,
-        };
-        let samples = parts
-            .into_iter()
-            .flat_map(|part| {
-                let (along_m, is_driven) = (part * length_m, part <= 1.0);
-                discs(start.after(motion, part)).map(move |(disc, at_m)| Sample {
-                    disc,
-                    along_m,
-                    is_driven,
-                    at_m,
-                    spot: ground.spot(at_m),
-                })
-            })
-            .collect();
-        let is_turn = matches!(motion, Motion::Turn { .. });
-        let is_backwards = matches!(*motion, Motion::Arc { length_m, .. } if length_m < 0.0);
-        Self { settings, limits: ground.limits, ground, samples, start_m, is_turn, is_backwards, evaluated_m }
+        let samples = footprint.discs.iter().map(|disc| {
+            let at_m = start.place(disc.place_m);
+            Sample { disc: *disc, at_m, spot: ground.spot(at_m) }
+        });
+        Self {
+            settings,
+            limits: ground.limits,
+            ground,
+            samples: samples.collect(),
+            start_m,
+            is_turn: matches!(footprint.motion, Motion::Turn { .. }),
+            is_backwards: footprint.is_backwards(),
+            evaluated_m: footprint.evaluated_m,
+        }
     }
 
     fn driven(&self) -> impl Iterator<Item = &Sample> {
-        self.samples.iter().filter(|sample| sample.is_driven)
+        self.samples.iter().filter(|sample| sample.disc.is_driven)
     }
 
     /// Bad samples of the driven part that the rover may not pass, in the order of the distance.
     fn failing(&self) -> impl Iterator<Item = &Sample> {
         let mut may_remain = [0, 1, 2].map(|disc| self.start_m[disc] < 0.0 && self.leaves_bad_ground(disc));
         self.driven().filter(move |sample| {
-            let is_near = !self.is_turn && sample.along_m <= self.settings.escape_m;
-            let is_no_deeper = sample.spot.clearance_m >= self.start_m[sample.disc];
-            let may_remain = &mut may_remain[sample.disc];
+            let is_near = !self.is_turn && sample.disc.along_m <= self.settings.escape_m;
+            let is_no_deeper = sample.spot.clearance_m >= self.start_m[sample.disc.number];
+            let may_remain = &mut may_remain[sample.disc.number];
             *may_remain &= sample.spot.is_bad() && is_near && is_no_deeper;
             sample.spot.is_bad() && !*may_remain
         })
@@ -159,7 +211,7 @@ impl<'a> Path<'a> {
 
     /// Whether a disc is less deep in bad cells after the motion than before it.
     fn leaves_bad_ground(&self, disc: usize) -> bool {
-        let last = self.driven().filter(|sample| sample.disc == disc).last();
+        let last = self.driven().filter(|sample| sample.disc.number == disc).last();
         last.is_some_and(|sample| sample.spot.clearance_m > self.start_m[disc])
     }
 
@@ -170,15 +222,16 @@ impl<'a> Path<'a> {
 
     /// The ground under the rover's origin along the path.
     pub(super) fn centres(&self) -> impl Iterator<Item = Spot> {
-        self.samples.iter().filter(|sample| sample.disc == 0).map(|sample| sample.spot)
+        self.samples.iter().filter(|sample| sample.disc.number == 0).map(|sample| sample.spot)
     }
 
-    /// Whether the ground of a sample counts as unknown; backwards also where little of its disc was seen.
     fn is_unknown(&self, sample: &Sample) -> bool {
         let cell = &sample.spot.cell;
-        let is_uncertain = f64::from(cell.certainty) < self.settings.back_certainty_min;
-        cell.basis == CellBasis::Unknown
-            || (self.is_backwards && cell.basis == CellBasis::Measured && is_uncertain)
+        if self.is_backwards {
+            is_unknown_behind(cell, self.settings)
+        } else {
+            cell.basis == CellBasis::Unknown
+        }
     }
 
     /// Share of unknown samples of the driven part, 0 to 1.
@@ -208,7 +261,7 @@ impl<'a> Path<'a> {
         // A sample outside the window has no cell.
         let in_site_m = sample.spot.index.map_or(sample.at_m, |index| self.ground.map.grid.centre_m(index));
         let limit = if term == HazardTerm::Unknown { self.unknown_limit() } else { self.limits.of(term) };
-        Some(Veto { in_site_m, along_m: sample.along_m, term, value, limit })
+        Some(Veto { in_site_m, along_m: sample.disc.along_m, term, value, limit })
     }
 
     /// The largest value of a term among the failing cells; the share of unknown samples for `unknown`.
@@ -222,8 +275,8 @@ impl<'a> Path<'a> {
     /// The hazard term, 0 (worst) to 1.
     pub(super) fn hazard(&self) -> f64 {
         let (mut worst, mut sum, mut weights) = (f64::INFINITY, 0.0, 0.0);
-        for sample in self.samples.iter().filter(|sample| sample.disc == 0 || self.is_turn) {
-            let weight = 1.0 / (1.0 + sample.along_m);
+        for sample in self.samples.iter().filter(|sample| sample.disc.number == 0 || self.is_turn) {
+            let weight = 1.0 / (1.0 + sample.disc.along_m);
             weights += weight;
             if sample.spot.cell.basis != CellBasis::Unknown {
                 let quality = sample.spot.quality(self.settings);
@@ -249,6 +302,12 @@ impl<'a> Path<'a> {
             CellBasis::Assumed | CellBasis::Exempt => discounted.max(self.ground.map.settings.certainty_min),
         }
     }
+}
+
+/// Whether ground counts as unknown for a rover that backs up: also where little of the disc was seen.
+pub(super) fn is_unknown_behind(cell: &GoodnessCell, settings: &NavigatorSettings) -> bool {
+    let is_uncertain = f64::from(cell.certainty) < settings.back_certainty_min;
+    cell.basis == CellBasis::Unknown || (cell.basis == CellBasis::Measured && is_uncertain)
 }
 
 /// Distances of the discs ahead of the rover's origin, m.

@@ -69,11 +69,16 @@ impl<'a> Route<'a> {
         Some(self.interpolated(at_m))
     }
 
-    /// Mean of F over spots; 1 outside the window.
+    /// F of a cell; 1 outside the window.
+    pub(super) fn cost_of(&self, index: Option<usize>) -> f64 {
+        index.map_or(1.0, |index| f64::from(self.costs[index]))
+    }
+
+    /// Mean of F over spots.
     pub(super) fn mean_cost(&self, spots: impl Iterator<Item = Spot>) -> f64 {
         let (mut sum, mut count) = (0.0, 0.0);
         for spot in spots {
-            sum += spot.index.map_or(1.0, |index| f64::from(self.costs[index]));
+            sum += self.cost_of(spot.index);
             count += 1.0;
         }
         if count > 0.0 { sum / count } else { 1.0 }

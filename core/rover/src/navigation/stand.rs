@@ -1,8 +1,8 @@
 //! Where the rover heads for: its goal, or the nearest place to it where it can stand and that is not enclosed.
 //!
 //! It can stand where the disc at its origin and, in one of `HEADINGS` directions, the leading one are on no bad cell (`path.rs`). Unknown
-//! cells count as good: they become known on the way there. A place is enclosed if the way to it cannot begin outside a small pocket
-//! (`way.rs`).
+//! cells count as good: they become known on the way there. A place is enclosed if closed bad ground separates it from the rover
+//! (`reachable.rs`), or if the way to it cannot begin outside a small pocket (`search.rs`).
 //!
 //! Frame: site, m.
 
@@ -13,9 +13,11 @@ use utoipa::ToSchema;
 
 use crate::hazards::goodness::HazardTerm;
 
-use super::ground::{Ground, Spot};
+use super::ground::Spot;
+use super::moves::Moves;
 use super::path::Stance;
-use super::way::square_of;
+use super::reachable::Reachable;
+use super::search::{pocket, square_of};
 
 const HEADINGS: u32 = 24;
 /// Other places are looked for up to this distance from the goal, m.
@@ -23,8 +25,10 @@ const SEARCH_M: f64 = 3.0;
 /// The rover stays if it is no more than this farther from the goal than the nearest place, m: on another side of a rock there is always a
 /// place that seems a little nearer.
 const NEAR_M: f64 = 0.3;
-/// Most enclosed places that are left out.
+/// Most pockets that are left out.
 const POCKETS_MAX: usize = 4;
+/// A place with fewer stances around it is not headed for: the rover would have to arrive at it from a single direction.
+const STANCES_MIN: usize = 100;
 
 /// A goal that the rover cannot reach, as far as its map shows.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -51,9 +55,10 @@ pub struct BadGround {
 /// Where the rover heads for.
 #[derive(Clone)]
 pub(super) struct Aim<'a> {
-    ground: &'a Ground<'a>,
+    moves: &'a Moves<'a>,
+    rover_m: [f64; 2],
     goal_m: [f64; 2],
-    reach_m: f64,
+    reachable: Reachable,
     pockets: Vec<HashSet<[i64; 2]>>,
     /// Site frame, m.
     pub(super) at_m: [f64; 2],
@@ -62,13 +67,15 @@ pub(super) struct Aim<'a> {
 }
 
 impl<'a> Aim<'a> {
-    /// The goal, or the nearest place to it where the rover can stand; the goal if there is none.
-    pub(super) fn of(ground: &'a Ground<'a>, goal_m: [f64; 2], reach_m: f64) -> Self {
-        let aim = Self { ground, goal_m, reach_m, pockets: Vec::new(), at_m: goal_m, blocked: None };
-        match aim.bad_spot(goal_m) {
-            Some(spot) => aim.elsewhere(Some(spot)),
-            None => aim,
-        }
+    /// The goal, or the nearest place to it where a rover at a position can stand and that is not enclosed; the goal if there is none.
+    /// Positions: site frame, m.
+    pub(super) fn of(moves: &'a Moves<'a>, rover_m: [f64; 2], goal_m: [f64; 2]) -> Self {
+        let (reachable, pockets) = (Reachable::new(moves.ground, rover_m), Vec::new());
+        let aim = Self { moves, rover_m, goal_m, reachable, pockets, at_m: goal_m, blocked: None };
+        let bad = aim.bad_spot(goal_m);
+        let cell = moves.ground.map.grid.index_at(goal_m);
+        let is_enclosed = cell.is_some_and(|index| !aim.reachable.contains(index));
+        if bad.is_some() || is_enclosed { aim.elsewhere(bad) } else { aim }
     }
 
     /// The nearest other place, outside a pocket that encloses this one; `None` if there is none.
@@ -90,14 +97,20 @@ impl<'a> Aim<'a> {
     }
 
     fn elsewhere(self, bad: Option<Spot>) -> Self {
-        let grid = &self.ground.map.grid;
+        let grid = &self.moves.ground.map.grid;
         let distance = |at: [f64; 2]| (at[0] - self.goal_m[0]).hypot(at[1] - self.goal_m[1]);
         let is_enclosed = |at: [f64; 2]| self.pockets.iter().any(|pocket| pocket.contains(&square_of(at)));
-        let nearest_m = (0..grid.len())
+        let mut places: Vec<[f64; 2]> = (0..grid.len())
+            .filter(|index| self.reachable.contains(*index))
             .map(|index| grid.centre_m(index))
-            .filter(|at| distance(*at) <= SEARCH_M && !is_enclosed(*at) && self.bad_spot(*at).is_none())
-            .min_by(|a, b| distance(*a).total_cmp(&distance(*b)));
-        let limits = &self.ground.limits;
+            .filter(|at| distance(*at) <= SEARCH_M && !is_enclosed(*at))
+            .collect();
+        places.sort_by(|a, b| distance(*a).total_cmp(&distance(*b)));
+        let is_open = |at: &[f64; 2]| {
+            self.bad_spot(*at).is_none() && pocket(self.moves, *at, self.rover_m, STANCES_MIN).is_none()
+        };
+        let nearest_m = places.into_iter().find(is_open);
+        let limits = &self.moves.ground.limits;
         let ground = bad.and_then(|spot| {
             let term = limits.exceeded(&spot.cell)?;
             Some(BadGround { term, value: spot.cell.value(term), limit: limits.of(term) })
@@ -108,14 +121,15 @@ impl<'a> Aim<'a> {
 
     /// The bad ground that keeps the rover from standing at a place; `None` if it can.
     fn bad_spot(&self, at_m: [f64; 2]) -> Option<Spot> {
-        let centre = self.ground.spot(at_m);
+        let centre = self.moves.ground.spot(at_m);
         if centre.is_bad() {
             return Some(centre);
         }
         let mut last = None;
         for number in 0..HEADINGS {
             let heading_rad = std::f64::consts::TAU * f64::from(number) / f64::from(HEADINGS);
-            let ahead = self.ground.spot(Stance { at_m, heading_rad }.place([self.reach_m, 0.0]));
+            let ahead =
+                self.moves.ground.spot(Stance { at_m, heading_rad }.place([self.moves.reach_m(), 0.0]));
             if !ahead.is_bad() {
                 return None;
             }
