@@ -6,6 +6,7 @@ use sightline_geometry::cancel::Cancel;
 use sightline_recordings::DrivenTraverse;
 use sightline_rover::driving::{ArrivalAction, DriveCommand, Motion, NavigatorKind, StopReason};
 use sightline_rover::visual_odometry::OdometryMode;
+use sightline_session::stop_cause::StopCause;
 use sightline_session::targeted_drive::TargetedDrive;
 use sightline_track::presets::preset;
 use sightline_track::settings::Settings;
@@ -174,10 +175,15 @@ fn an_approach_after_arrival_brings_the_target_into_reach_of_the_arm() {
         drive
     };
     assert_eq!(to_rocks("blind", NavigatorKind::Arcs).summary().reason, Some(StopReason::Stalled));
-    let drive = to_rocks("map", NavigatorKind::Gestalt);
+    let mut drive = to_rocks("map", NavigatorKind::Gestalt);
     let (summary, last) = (drive.summary(), drive.cycles.last().unwrap());
     println!("{summary:?}");
     assert_eq!((summary.reason, summary.collisions), (Some(StopReason::NoSafePath), 0));
     let detail = last.ending.as_ref().unwrap().detail.as_deref().unwrap();
     assert!(detail.starts_with("the way of the approach is not clear: at x "), "{detail}");
+    let named = format!("No path is safe: {detail}.");
+    let why = drive.why().unwrap();
+    println!("{why:#?}");
+    assert_eq!((why.cause, why.sentence), (Some(StopCause::NoSafePath), named));
+    assert!(why.evidence[0].contains("2.60 m") && why.evidence[0].contains("1.30 m"), "{:?}", why.evidence);
 }

@@ -1,4 +1,5 @@
-//! Causes on the hazard map: ground beyond a limit under every path, and obstacles that move with the rover.
+//! Causes on the hazard map: ground beyond a limit under every path, an obstacle in the way of an approach, and obstacles that move with
+//! the rover.
 
 use std::collections::BTreeMap;
 
@@ -101,6 +102,26 @@ impl StoppedDrive<'_> {
         let evidence = [turns, Some(nearest(vetoes)?), others, points, fixed].into_iter().flatten().collect();
         let sentence = vetoed(vetoes, choice.candidates.len())?;
         Some(Found { cause: StopCause::NoSafePath, sentence, evidence })
+    }
+
+    /// Something too high in the way of an approach.
+    pub(super) fn approach_not_clear(&self) -> Option<Found> {
+        let last = self.cycles.last()?;
+        if self.reason()? != StopReason::NoSafePath || !self.command.is_approach(last.arrival_actions) {
+            return None;
+        }
+        let detail = last.ending.as_ref()?.detail.as_ref()?;
+        let final_m = self.command.final_standoff_m;
+        let arrived = format!(
+            "The rover has arrived at {} from the target; the approach would have led it on to {}, straight or by one arc.",
+            metres(self.command.standoff_m),
+            metres(final_m)
+        );
+        let others =
+            "A larger final_standoff_m, another offset of the goal or no approach leaves this ground free."
+                .to_owned();
+        let sentence = format!("No path is safe: {detail}.");
+        Some(Found { cause: StopCause::NoSafePath, sentence, evidence: vec![arrived, others] })
     }
 
     /// The stops between which a rover without a safe arc ahead turned to and fro: none if it stays. `None` if it has one, or ended for

@@ -6,6 +6,7 @@
 //! | any but `arrived` | `featureless_ground` | visual odometry refused its last motions for want of points or matches |
 //! | any but `arrived` | `repeating_ground` | … because another motion fits as well |
 //! | no way on | `false_obstacle` | ground rises before the rover from stop to stop (`blocked`) |
+//! | `no_safe_path` in an approach after arrival | `no_safe_path` | the obstacle in its way (`blocked`) |
 //! | `no_safe_path`, or `limit_cycle` or `goal_blocked` without a safe arc | `no_safe_path` | the term that vetoes most paths, and by how much |
 //! | `limit_cycle` | `limit_cycle` | the stops at one place, and what moves the rover away from the goal there |
 //!
@@ -146,8 +147,8 @@ impl StoppedDrive<'_> {
         let last = self.cycles.last()?;
         let ending = last.ending.as_ref()?;
         let found = self.order_of_events().or_else(|| self.unusable_ground());
-        let found = found.or_else(|| self.false_obstacle()).or_else(|| self.no_safe_path());
-        let found = found.or_else(|| self.limit_cycle());
+        let found = found.or_else(|| self.false_obstacle()).or_else(|| self.approach_not_clear());
+        let found = found.or_else(|| self.no_safe_path()).or_else(|| self.limit_cycle());
         let cause = found.as_ref().map(|found| found.cause);
         let (sentence, evidence) = match found {
             Some(found) => (found.sentence, found.evidence),
