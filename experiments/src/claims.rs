@@ -30,7 +30,7 @@ use sightline_world::{Scenario, choose_targets};
 const DEGREES_OF_FREEDOM: f64 = 3.0;
 
 /// The targets of one world.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct WorldClaim {
     /// The world's seed.
     pub seed: u64,
@@ -44,11 +44,16 @@ pub struct WorldClaim {
     pub nees_per_dof_angles_exact: Option<f64>,
     /// Root mean square error of the tracked ones, m.
     pub rms_error_m: Option<f64>,
+    /// Why the world has no drive, so that its targets are left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub problem: Option<String>,
 }
 
 /// The worlds together.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Claims {
+    /// Worlds without a drive, which are left out.
+    pub without_drive: usize,
     /// Targets in all worlds.
     pub targets: usize,
     /// Targets that were tracked at the last stop.
@@ -70,9 +75,16 @@ struct End {
 /// Tracks all targets of a world; its images are below `folder`.
 ///
 /// # Errors
-/// A drive that is impossible in this world, or images that cannot be written.
+/// Images that cannot be written, or a stage that fails.
 pub(crate) fn world_claim(scenario: &Scenario, settings: &Settings, folder: &Path) -> Result<WorldClaim> {
-    let traverse = create_simulated(scenario, folder)?;
+    let traverse = match create_simulated(scenario, folder) {
+        // The scenario is valid: the rover cannot drive it in this world.
+        Err(error @ Error::Setting { .. }) => {
+            let problem = Some(error.to_string());
+            return Ok(WorldClaim { seed: scenario.seed, problem, ..WorldClaim::default() });
+        }
+        traverse => traverse?,
+    };
     let world = traverse.world().ok_or_else(|| Error::Request("the drive is not simulated".to_owned()))?;
     let pixels = choose_targets(world, scenario, traverse.index());
     let ends: Vec<Option<End>> =
@@ -89,6 +101,7 @@ pub(crate) fn world_claim(scenario: &Scenario, settings: &Settings, folder: &Pat
         nees_per_dof: mean(&|end| end.nees / DEGREES_OF_FREEDOM),
         nees_per_dof_angles_exact: mean(&|end| end.nees_angles_exact / DEGREES_OF_FREEDOM),
         rms_error_m: mean(&|end| end.error_m * end.error_m).map(f64::sqrt),
+        problem: None,
     })
 }
 
@@ -137,6 +150,7 @@ pub fn claims(worlds: &[WorldClaim]) -> Claims {
         [mean, variance.sqrt(), least, values.iter().copied().fold(f64::NEG_INFINITY, f64::max)]
     };
     Claims {
+        without_drive: worlds.iter().filter(|world| world.problem.is_some()).count(),
         targets: worlds.iter().map(|world| world.targets).sum(),
         tracked: worlds.iter().map(|world| world.tracked).sum(),
         nees_per_dof: spread(|world| world.nees_per_dof),
@@ -156,10 +170,11 @@ mod tests {
             tracked: targets / 2,
             nees_per_dof,
             nees_per_dof_angles_exact: nees_per_dof.map(|nees| 2.0 * nees),
-            rms_error_m: None,
+            ..WorldClaim::default()
         };
-        let summed = claims(&[world(20, Some(0.5)), world(4, Some(1.5)), world(0, None)]);
-        assert_eq!((summed.targets, summed.tracked), (24, 12));
+        let impossible = WorldClaim { problem: Some("no drive".to_owned()), ..WorldClaim::default() };
+        let summed = claims(&[world(20, Some(0.5)), world(4, Some(1.5)), world(0, None), impossible]);
+        assert_eq!((summed.targets, summed.tracked, summed.without_drive), (24, 12, 1));
         let [mean, spread, least, most] = summed.nees_per_dof;
         assert!((mean - 1.0).abs() < 1e-12 && (spread - 0.5f64.sqrt()).abs() < 1e-12);
         assert_eq!((least, most, summed.nees_per_dof_angles_exact[0]), (0.5, 1.5, 2.0));

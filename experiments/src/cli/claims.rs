@@ -32,7 +32,7 @@ impl Claimed {
     /// Tracks the targets of every world; writes one JSON object a world, then one of all.
     ///
     /// # Errors
-    /// A bad setting, a drive that is impossible in its world, or no room for images.
+    /// A bad setting, or no room for images.
     pub(super) fn run(&self) -> Result<()> {
         let settings = self.of.settings()?;
         let mut base = randomised::base("claim")?;
@@ -47,11 +47,12 @@ impl Claimed {
                 scenario.drive.pointing_error_deg = error_deg;
             }
             scenario.validate()?;
-            let world = world_claim(&scenario, &settings, &folder.join(format!("{number}")))?;
-            line(&world)?;
-            found.push(world);
+            let world = world_claim(&scenario, &settings, &folder.join(format!("{number}")));
             // The images are not needed any more.
             let _ = std::fs::remove_dir_all(&folder);
+            let world = world?;
+            line(&world)?;
+            found.push(world);
         }
         line(&Summary { summary: claims(&found) })
     }
