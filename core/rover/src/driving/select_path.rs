@@ -68,6 +68,9 @@ impl ArcNavigator {
     /// The motion towards a goal ahead and to the right of the rover, m, of at most `step_m`.
     pub fn motion(&self, [x, y]: [f64; 2], step_m: f64) -> Motion {
         let distance_m = x.hypot(y);
+        if distance_m == 0.0 {
+            return Motion::Arc { length_m: 0.0, curvature_per_m: 0.0 };
+        }
         let is_reverse = x < 0.0 && distance_m <= self.reverse_max_m;
         // Backwards, the circle is that of the mirrored goal.
         let bearing_rad = y.atan2(if is_reverse { -x } else { x });
@@ -102,6 +105,8 @@ mod tests {
             let ([x, y], _) = motion.after(1.0);
             assert!((x - goal[0]).hypot(y - goal[1]) < 1e-12, "{goal:?}: {motion:?} ends at {x} {y}");
         }
+        let nowhere = Motion::Arc { length_m: 0.0, curvature_per_m: 0.0 };
+        assert_eq!(ArcNavigator::default().motion([0.0, 0.0], 1.0), nowhere);
     }
 
     #[test]

@@ -36,6 +36,8 @@ pub mod counterfactual;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]
+mod enclosed_tests;
+#[cfg(test)]
 mod drive_tests;
 
 pub use counterfactual::{LimitChange, counterfactual};

@@ -5,8 +5,7 @@
 //! last     within `LAST_M` of the goal: one arc, backwards within `LAST_BACKWARDS_M`, or the turn that faces it and straight ahead
 //! cost     F Δs of an arc, `TURN_M_PER_RAD` |Δψ| of a turn      (F: `route.rs`)
 //! ```
-//! Their footprints are computed once. A motion that starts on bad ground is judged by [`Path`], as all others are whose footprint is used
-//! once.
+//! Their footprints are computed once. A motion that starts on bad ground is judged by [`Path`], whose rules for leaving it apply.
 //!
 //! Frame: site, horizontal.
 
@@ -19,13 +18,13 @@ use super::route::Route;
 use super::settings::NavigatorSettings;
 
 pub(super) const HEADING_DEG: f64 = 15.0;
-const STEP_M: f64 = 0.3;
+pub(super) const STEP_M: f64 = 0.3;
 const CURVATURES: [f64; 5] = [0.0, -0.5, 0.5, -1.0, 1.0];
 const TURN_M_PER_RAD: f64 = 1.0;
 const LAST_M: f64 = 1.5;
 const LAST_BACKWARDS_M: f64 = 0.5;
 
-/// The motions over a ground.
+/// The motions of a search over a ground.
 pub(super) struct Moves<'a> {
     pub(super) ground: &'a Ground<'a>,
     settings: &'a NavigatorSettings,
@@ -56,6 +55,11 @@ impl Start {
     pub(super) fn after(&self, footprint: &Footprint) -> Stance {
         let (moved, turned_rad) = footprint.moved;
         Stance { at_m: self.place(moved), heading_rad: self.stance.heading_rad + turned_rad }
+    }
+
+    /// Whether no disc of the footprint of any motion is on bad ground.
+    pub(super) fn is_free(&self) -> bool {
+        self.is_free
     }
 
     /// A position ahead and to the right in the site frame, m.
@@ -116,7 +120,8 @@ impl<'a> Moves<'a> {
         self.visit(start, footprint, |_| ())
     }
 
-    /// Visits the cells under the rover's origin, `None` outside the window; whether the motion from free ground is not vetoed.
+    /// Visits the cells under the rover's origin, `None` outside the window, up to the first veto; whether there is none. The motion starts
+    /// on free ground, and its footprint is evaluated no farther than it is driven.
     fn visit(&self, start: &Start, footprint: &Footprint, mut visit: impl FnMut(Option<usize>)) -> bool {
         let is_backwards = footprint.is_backwards();
         for disc in &footprint.discs {
@@ -138,6 +143,7 @@ impl<'a> Moves<'a> {
         true
     }
 
+    /// The path of a footprint.
     fn path(&self, stance: &Stance, footprint: &Footprint) -> Path<'a> {
         Path::along(self.ground, stance, footprint, self.settings)
     }
@@ -147,8 +153,8 @@ impl<'a> Moves<'a> {
         (!path.is_bad()).then(|| footprint.cost_m(route.mean_cost(path.centres())))
     }
 
-    /// Whether the rover stands on no bad cell.
-    pub(super) fn is_free(&self, stance: &Stance) -> bool {
+    /// Whether neither the disc at the rover's origin nor the leading one is on bad ground.
+    pub(super) fn can_stand(&self, stance: &Stance) -> bool {
         [0.0, self.settings.reach_m].iter().all(|ahead| !self.ground.is_bad_at(stance.place([*ahead, 0.0])))
     }
 
@@ -177,9 +183,56 @@ impl<'a> Moves<'a> {
         let start = self.start(*stance);
         let is_backwards = matches!(*motion, Motion::Arc { length_m, .. } if length_m < 0.0);
         // The end alone refuses most motions ahead.
-        if start.is_free && !is_backwards && !self.is_free(&stance.after(motion, 1.0)) {
+        if start.is_free && !is_backwards && !self.can_stand(&stance.after(motion, 1.0)) {
             return false;
         }
         self.is_safe(&start, &Footprint::new(motion, 0.0, self.settings))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+
+    use super::super::limits::VetoLimits;
+    use super::super::tests::{Rock, known, pose, rocks_height};
+    use super::*;
+    use crate::hazards::HazardSettings;
+
+    #[test]
+    fn motions_are_judged_as_paths_from_any_stance() {
+        let rocks = [[2.0, 0.5], [-1.0, 2.5], [0.5, -3.0], [4.0, -1.5]];
+        let rocks = rocks.map(|at| Rock { at, radius: 0.3, height: 0.4 });
+        let map =
+            known(&pose([0.0, 0.0], 0.0), &HazardSettings::default(), |x, y| rocks_height(&rocks, x, y));
+        let settings = NavigatorSettings::default();
+        let ground = Ground::new(&map, VetoLimits::new(&map.settings, &settings));
+        let (moves, route) = (Moves::new(&ground, &settings), Route::new(&ground, [5.0, 0.0], &settings));
+        let mut random = rand_pcg::Pcg64::seed_from_u64(7);
+        let mut counts = [0; 3];
+        for _ in 0..3000 {
+            let at_m = [0, 1].map(|_| random.random_range(-8.5..8.5));
+            let stance = Stance { at_m, heading_rad: random.random_range(-3.2..3.2) };
+            let start = moves.start(stance);
+            for footprint in moves.footprints() {
+                let path = Path::new(&ground, &stance, &footprint.motion, 0.0, &settings);
+                assert_eq!(
+                    moves.is_safe(&start, footprint),
+                    !path.is_bad(),
+                    "{stance:?} {:?}",
+                    footprint.motion
+                );
+                let cost = moves.cost(&start, footprint, &route);
+                assert_eq!(cost.is_some(), !path.is_bad());
+                let of_path = footprint.cost_m(route.mean_cost(path.centres()));
+                assert!(
+                    cost.is_none_or(|cost| (cost - of_path).abs() < 1e-9 && cost > 0.0),
+                    "{cost:?} {of_path}"
+                );
+                counts[usize::from(path.is_bad())] += 1;
+                counts[2] += usize::from(!start.is_free());
+            }
+        }
+        assert!(counts.iter().all(|count| *count > 1000), "{counts:?}");
     }
 }

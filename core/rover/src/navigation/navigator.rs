@@ -80,7 +80,7 @@ impl HazardNavigator {
         let moves = Moves::new(&ground, settings);
         let mut decision =
             Decision { settings, ground: &ground, input, start, aim_m: goal_m, route: None, way: None };
-        let mut aim = Aim::of(&moves, start.at_m, goal_m);
+        let mut aim = Aim::of(&moves, start, goal_m);
         if settings.has_route {
             aim = decision.find_way(&moves, aim);
         } else {
@@ -152,7 +152,7 @@ impl<'a> Decision<'a> {
             let found = Search::new(moves, &route, self.start).run(STANCES_MAX);
             let is_unfinished = matches!(found, Found::Unfinished);
             let pocket = is_unfinished
-                .then(|| search::pocket(moves, aim.at_m, self.start.at_m, POCKET_STANCES_MAX))
+                .then(|| search::pocket(moves, aim.at_m, &self.start, POCKET_STANCES_MAX))
                 .flatten();
             self.route = Some(route);
             if let Some(other) = pocket.and_then(|pocket| aim.outside(&pocket)) {

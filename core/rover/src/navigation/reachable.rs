@@ -4,7 +4,7 @@
 //! reachable   cells connected with that of the rover over their eight neighbours, none of them bad
 //!             and, if one of these is on the border of the window, all that are connected with the border: outside is unknown ground
 //! ```
-//! Samples of a path are nearer to each other than a cell is wide: a path without a bad sample leaves no region. A region with an exit that is
+//! With samples of a path nearer to each other than a cell is wide, a path without a bad sample leaves no region. A region with an exit that is
 //! too narrow for the rover is left to the search (`search.rs`).
 //!
 //! Frame: site, m.
@@ -67,13 +67,15 @@ fn is_border(row: usize, column: usize, side: usize) -> bool {
 mod tests {
     use super::super::limits::VetoLimits;
     use super::super::settings::NavigatorSettings;
-    use super::super::tests::{known, pose};
+    use super::super::tests::{known_to, pose};
     use super::*;
     use crate::hazards::HazardSettings;
 
     /// Whether places are reachable from the origin over ground of a height function.
     fn reached(height: impl Fn(f64, f64) -> f64, places: &[[f64; 2]]) -> Vec<bool> {
-        let map = known(&pose([0.0, 0.0], 0.0), &HazardSettings::default(), height);
+        let (stance, settings) = (pose([0.0, 0.0], 0.0), HazardSettings::default());
+        // Beyond the corners of the window.
+        let map = known_to(12.0, &stance, &settings, height);
         let ground = Ground::new(&map, VetoLimits::new(&map.settings, &NavigatorSettings::default()));
         let reachable = Reachable::new(&ground, [0.0, 0.0]);
         places.iter().map(|at| reachable.contains(map.grid.index_at(*at).expect("in the window"))).collect()
@@ -91,9 +93,8 @@ mod tests {
 
     #[test]
     fn regions_that_meet_outside_the_window_are_connected() {
-        // Range data end at 6 m, so that the ends of the wall are open.
         let wall = |x: f64, _: f64| if (2.0..2.5).contains(&x) { -0.4 } else { 0.0 };
-        assert_eq!(reached(wall, &[[4.0, 0.0], [2.2, 0.0]]), [true, false]);
+        assert_eq!(reached(wall, &[[4.0, 0.0], [2.2, 0.0], [2.2, 7.9]]), [true, false, false]);
         // Enclosed itself, the rover reaches nothing else.
         let closed = |x: f64, y: f64| if x.hypot(y) > 1.4 && x.hypot(y) < 1.9 { -0.4 } else { 0.0 };
         assert_eq!(reached(closed, &[[0.3, 0.0], [4.0, 0.0], [7.9, 0.0]]), [true, false, false]);

@@ -2,9 +2,10 @@
 //!
 //! ```text
 //! stance   position and heading; of stances in one square of `CELL_M` and one sector of `HEADING_DEG` the one with the least sum counts
-//! motions  those of `moves.rs`, at last one that ends at the goal
+//! motions  those of `moves.rs`, at last those that end at the goal
 //! order    A*: sum of the cost so far and T from there (cost: `moves.rs`, T: `route.rs`)
-//! pocket   the search backwards from a place ends after few stances: bad ground encloses it
+//! pocket   the search backwards from a place ends after few stances: bad ground encloses it. Motions other than those are not tried
+//!          there, so that a place with a way of its own may seem enclosed.
 //! ```
 //! Every motion is subject to the vetoes of [`super::navigator`], except that of unknown ground, because distant ground becomes known as
 //! the rover approaches it. A gap between rocks that needs a stance between two squares may be missed.
@@ -22,7 +23,7 @@ use crate::hazards::grid::Grid;
 
 use super::ground::Ground;
 use super::limits::VetoLimits;
-use super::moves::{HEADING_DEG, Moves};
+use super::moves::{HEADING_DEG, Moves, STEP_M};
 use super::path::Stance;
 use super::route::Route;
 use super::settings::NavigatorSettings;
@@ -54,15 +55,17 @@ pub(super) enum Found {
     Goal(Way),
     /// There is none: a way to the nearest stance to the goal that can be reached.
     Nearest(Way),
-    /// The limit of stances was met first.
+    /// The limit of stances was met first, or ways lead out of the window.
     Unfinished,
 }
 
-/// A stance that was reached, and by which motion from which other one.
+/// A stance that was reached.
 struct Node {
     stance: Stance,
+    /// Sum of the costs up to it, m.
     cost_m: f64,
-    came: Option<(usize, Motion)>,
+    /// The stance before and the motion from there; `None` of the start.
+    parent: Option<(usize, Motion)>,
 }
 
 /// A search under way.
@@ -77,6 +80,8 @@ pub(super) struct Search<'a> {
     count: usize,
     /// Distance from the goal, m, and the node.
     nearest: (f64, usize),
+    /// Whether a motion leads out of the window.
+    leads_out: bool,
 }
 
 impl<'a> Search<'a> {
@@ -85,11 +90,12 @@ impl<'a> Search<'a> {
         Self {
             moves,
             route,
-            nodes: vec![Node { stance: start, cost_m: 0.0, came: None }],
+            nodes: vec![Node { stance: start, cost_m: 0.0, parent: None }],
             open: BinaryHeap::from([(Reverse(0), 0)]),
             least: LeastSums::new(&route.ground.map.grid),
             count: 0,
             nearest: (f64::INFINITY, 0),
+            leads_out: false,
         }
     }
 
@@ -97,7 +103,9 @@ impl<'a> Search<'a> {
     pub(super) fn run(mut self, stances_max: usize) -> Found {
         while self.count < stances_max {
             let Some((_, index)) = self.open.pop() else {
-                return Found::Nearest(self.way(self.nearest.1, Vec::new()));
+                let is_enclosed = !self.leads_out;
+                let nearest = is_enclosed.then(|| self.way(self.nearest.1, Vec::new()));
+                return nearest.map_or(Found::Unfinished, Found::Nearest);
             };
             let stance = self.nodes[index].stance;
             if !self.least.close(&stance) {
@@ -116,12 +124,16 @@ impl<'a> Search<'a> {
         Found::Unfinished
     }
 
+    /// Opens the stances after those motions from a node that are safe and lower a sum.
     fn search_on(&mut self, index: usize) {
         let Node { stance, cost_m, .. } = self.nodes[index];
         let start = self.moves.start(stance);
         for footprint in self.moves.footprints() {
             let after = start.after(footprint);
-            let Some(left_m) = self.route.cost_at(after.at_m) else { continue };
+            let Some(left_m) = self.route.cost_at(after.at_m) else {
+                self.leads_out |= self.moves.is_safe(&start, footprint);
+                continue;
+            };
             // Good ground is the least that a motion costs.
             if !self.least.is_less(&after, cost_m + footprint.cost_m(1.0) + left_m) {
                 continue;
@@ -131,7 +143,7 @@ impl<'a> Search<'a> {
             let sum_m = cost_m + left_m;
             if self.least.lower(&after, sum_m) {
                 self.open.push((Reverse(sum_m.to_bits()), self.nodes.len()));
-                self.nodes.push(Node { stance: after, cost_m, came: Some((index, footprint.motion)) });
+                self.nodes.push(Node { stance: after, cost_m, parent: Some((index, footprint.motion)) });
             }
         }
     }
@@ -139,7 +151,7 @@ impl<'a> Search<'a> {
     /// The way to a node and on by the last motions, which are in reverse order.
     fn way(&self, mut at: usize, last: Vec<Motion>) -> Way {
         let mut motions = last;
-        while let Some((before, motion)) = self.nodes[at].came {
+        while let Some((before, motion)) = self.nodes[at].parent {
             motions.push(motion);
             at = before;
         }
@@ -158,22 +170,22 @@ struct LeastSums {
 
 impl LeastSums {
     fn new(grid: &Grid) -> Self {
-        let first = square_of(grid.centre_m(0));
-        let last = square_of(grid.centre_m(grid.len() - 1));
-        // A square more on either side: a window may begin within one.
-        let side = (last[0] - first[0]).max(last[1] - first[1]) as usize + 3;
-        let count = side * side * sector_count();
-        Self { first: first.map(|number| number - 1), side, sums_m: vec![f64::INFINITY; count] }
+        let edge = |cells: i64| square_of(grid.first.map(|number| (number + cells) as f64 * grid.cell_m));
+        let (first, last) = (edge(0), edge(grid.side as i64));
+        let side = (last[0] - first[0]).max(last[1] - first[1]) as usize + 1;
+        Self { first, side, sums_m: vec![f64::INFINITY; side * side * sector_count()] }
     }
 
+    /// Where the sum of a stance is; `None` outside the window.
     fn index(&self, stance: &Stance) -> Option<usize> {
-        let [x, y, sector] = square(stance);
+        let [x, y, sector] = bin_of(stance);
         let within = |number: i64, axis: usize| {
-            usize::try_from(number - self.first[axis]).ok().filter(|number| *number < self.side)
+            usize::try_from(number.saturating_sub(self.first[axis])).ok().filter(|number| *number < self.side)
         };
         Some((within(x, 0)? * self.side + within(y, 1)?) * sector_count() + sector as usize)
     }
 
+    /// Whether a sum is less than all before.
     fn is_less(&self, stance: &Stance, sum_m: f64) -> bool {
         self.index(stance).is_some_and(|index| sum_m < self.sums_m[index])
     }
@@ -195,27 +207,31 @@ impl LeastSums {
 }
 
 /// The squares from which a way can lead to a place, x and y of the site frame, m, if bad ground encloses them; `None` if they have
-/// `stances_max` or more stances, or if the rover is among them. Ways are followed backwards from the place.
+/// `stances_max` or more stances, if the rover is among them or on bad ground. Ways are followed backwards from the place.
 pub(super) fn pocket(
     moves: &Moves<'_>,
     at_m: [f64; 2],
-    rover_m: [f64; 2],
+    rover: &Stance,
     stances_max: usize,
 ) -> Option<HashSet<[i64; 2]>> {
+    // A rover on bad ground leaves it by motions that no other stance may take.
+    if !moves.start(*rover).is_free() {
+        return None;
+    }
     let heading_rad = |k: u32| std::f64::consts::TAU * f64::from(k) / f64::from(POCKET_HEADINGS);
     let at_place = |k: u32| Stance { at_m, heading_rad: heading_rad(k) };
     let mut open: Vec<Stance> =
-        (0..POCKET_HEADINGS).map(at_place).filter(|stance| moves.is_free(stance)).collect();
-    let mut seen: HashSet<[i64; 3]> = open.iter().map(square).collect();
+        (0..POCKET_HEADINGS).map(at_place).filter(|stance| moves.can_stand(stance)).collect();
+    let mut seen: HashSet<[i64; 3]> = open.iter().map(bin_of).collect();
     while let Some(stance) = open.pop() {
-        if square_of(stance.at_m) == square_of(rover_m) || seen.len() >= stances_max {
+        if distance_m(stance.at_m, rover.at_m) <= STEP_M || seen.len() >= stances_max {
             return None;
         }
         for footprint in moves.footprints() {
             let before = stance.before(&footprint.motion);
-            let is_new = !seen.contains(&square(&before)) && moves.is_free(&before);
+            let is_new = !seen.contains(&bin_of(&before)) && moves.can_stand(&before);
             if is_new && moves.is_safe(&moves.start(before), footprint) {
-                seen.insert(square(&before));
+                seen.insert(bin_of(&before));
                 open.push(before);
             }
         }
@@ -229,7 +245,7 @@ pub(super) fn square_of(at_m: [f64; 2]) -> [i64; 2] {
 }
 
 /// Square and sector of a stance.
-fn square(stance: &Stance) -> [i64; 3] {
+fn bin_of(stance: &Stance) -> [i64; 3] {
     let [x, y] = square_of(stance.at_m);
     let sector = (stance.heading_rad.to_degrees() / HEADING_DEG).round().rem_euclid(sector_count() as f64);
     [x, y, sector as i64]
@@ -237,4 +253,52 @@ fn square(stance: &Stance) -> [i64; 3] {
 
 fn sector_count() -> usize {
     (360.0 / HEADING_DEG) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{known, known_to, pose};
+    use super::*;
+    use crate::hazards::HazardSettings;
+
+    #[test]
+    fn every_stance_in_the_window_has_a_sum() {
+        let map = known(&pose([0.37, -0.81], 0.0), &HazardSettings::default(), |_, _| 0.0);
+        let grid = &map.grid;
+        let mut sums = LeastSums::new(grid);
+        for heading_deg in [-179.9, 0.0, 7.4, 179.9, 725.0] {
+            for index in [0, grid.side - 1, grid.len() - grid.side, grid.len() - 1] {
+                let centre = grid.centre_m(index);
+                for offset in [-0.499, 0.499] {
+                    let at_m = centre.map(|along| along + offset * grid.cell_m);
+                    let stance = Stance { at_m, heading_rad: f64::to_radians(heading_deg) };
+                    assert!(sums.index(&stance).is_some(), "{stance:?}");
+                }
+            }
+        }
+        let stance = Stance { at_m: grid.centre_m(0), heading_rad: 1.0 };
+        assert!(sums.lower(&stance, 3.0) && !sums.lower(&stance, 3.0) && sums.is_less(&stance, 2.9));
+        assert!(sums.close(&stance) && !sums.close(&stance) && !sums.is_less(&stance, 0.0));
+        let far = Stance { at_m: [f64::INFINITY, f64::NEG_INFINITY], heading_rad: 0.0 };
+        assert!(sums.index(&far).is_none() && !sums.lower(&far, 0.0));
+    }
+
+    #[test]
+    fn a_way_out_of_the_window_leaves_the_search_unfinished() {
+        // A corridor to the left of the rover, 2 m wide, whose walls reach the border; the goal is behind its right end.
+        let settings = NavigatorSettings::default();
+        let found = |open: bool| {
+            let is_free = |x: f64, y: f64| x.abs() < 1.2 && (y < 1.2 && (open || y > -4.0));
+            let walls = |x: f64, y: f64| if is_free(x, y) { 0.0 } else { -0.5 };
+            let stance = pose([0.0, 0.0], 0.0);
+            let map = known_to(12.0, &stance, &HazardSettings::default(), walls);
+            let ground = Ground::new(&map, VetoLimits::new(&map.settings, &settings));
+            let route = Route::new(&ground, [0.0, 5.0], &settings);
+            let moves = Moves::new(&ground, &settings);
+            let start = Stance { at_m: [0.0, 0.0], heading_rad: -std::f64::consts::FRAC_PI_2 };
+            Search::new(&moves, &route, start).run(usize::MAX)
+        };
+        assert!(matches!(found(true), Found::Unfinished));
+        assert!(matches!(found(false), Found::Nearest(_)));
+    }
 }

@@ -27,7 +27,7 @@ const SEARCH_M: f64 = 3.0;
 const NEAR_M: f64 = 0.3;
 /// Most pockets that are left out.
 const POCKETS_MAX: usize = 4;
-/// A place with fewer stances around it is not headed for: the rover would have to arrive at it from a single direction.
+/// Fewer stances from which a way leads to a place make it a pocket that is not headed for.
 const STANCES_MIN: usize = 100;
 
 /// A goal that the rover cannot reach, as far as its map shows.
@@ -35,7 +35,7 @@ const STANCES_MIN: usize = 100;
 pub struct BlockedGoal {
     /// The ground on which it cannot stand there; null if the goal is on good ground that bad ground encloses.
     pub ground: Option<BadGround>,
-    /// The nearest place for which it heads instead, x and y of the site frame, m; null if there is none within 3 m.
+    /// The place for which it heads instead, x and y of the site frame, m; null if there is none within 3 m.
     pub nearest_m: Option<[f64; 2]>,
     /// Its distance from the goal, m; null without one.
     pub nearest_from_goal_m: Option<f64>,
@@ -56,7 +56,7 @@ pub struct BadGround {
 #[derive(Clone)]
 pub(super) struct Aim<'a> {
     moves: &'a Moves<'a>,
-    rover_m: [f64; 2],
+    rover: Stance,
     goal_m: [f64; 2],
     reachable: Reachable,
     pockets: Vec<HashSet<[i64; 2]>>,
@@ -67,11 +67,11 @@ pub(super) struct Aim<'a> {
 }
 
 impl<'a> Aim<'a> {
-    /// The goal, or the nearest place to it where a rover at a position can stand and that is not enclosed; the goal if there is none.
+    /// The goal, or the nearest place to it where the rover can stand and that is not enclosed; the goal if there is none.
     /// Positions: site frame, m.
-    pub(super) fn of(moves: &'a Moves<'a>, rover_m: [f64; 2], goal_m: [f64; 2]) -> Self {
-        let (reachable, pockets) = (Reachable::new(moves.ground, rover_m), Vec::new());
-        let aim = Self { moves, rover_m, goal_m, reachable, pockets, at_m: goal_m, blocked: None };
+    pub(super) fn of(moves: &'a Moves<'a>, rover: Stance, goal_m: [f64; 2]) -> Self {
+        let (reachable, pockets) = (Reachable::new(moves.ground, rover.at_m), Vec::new());
+        let aim = Self { moves, rover, goal_m, reachable, pockets, at_m: goal_m, blocked: None };
         let bad = aim.bad_spot(goal_m);
         let cell = moves.ground.map.grid.index_at(goal_m);
         let is_enclosed = cell.is_some_and(|index| !aim.reachable.contains(index));
@@ -107,7 +107,7 @@ impl<'a> Aim<'a> {
             .collect();
         places.sort_by(|a, b| distance(*a).total_cmp(&distance(*b)));
         let is_open = |at: &[f64; 2]| {
-            self.bad_spot(*at).is_none() && pocket(self.moves, *at, self.rover_m, STANCES_MIN).is_none()
+            self.bad_spot(*at).is_none() && pocket(self.moves, *at, &self.rover, STANCES_MIN).is_none()
         };
         let nearest_m = places.into_iter().find(is_open);
         let limits = &self.moves.ground.limits;
