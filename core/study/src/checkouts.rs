@@ -3,7 +3,7 @@
 //! | checkout | phases | beside it |
 //! |---|---|---|
 //! | 1 | the motions of the scenario, not towards the target | Table III; the centre of the turn that explains its rows 7 and 8 best |
-//! | 2 | to the target, pose by wheels and IMU | 15 updates, magnification, 19 minutes: too few for updates of the navigator |
+//! | 2 | to within 2 m of the target, pose by wheels and IMU | 15 updates, magnification, 19 minutes: too few for updates of the navigator |
 //! | 3 | turn, back up, return with visual odometry, return with hazard avoidance | Table IV |
 //! | 4 | to the target, hand-off to the hazcams, the point that the arm touches | 8 mm |
 //!
@@ -111,6 +111,8 @@ pub struct Checkout {
 /// The turn of checkout 1, rad, and the straight motion after it, m (R131).
 const TURN_RAD: f64 = 20.0 * std::f64::consts::PI / 180.0;
 const STRAIGHT_M: f64 = 1.0;
+/// Checkout 2 ends this near the target, m (R137).
+const WITHIN_M: f64 = 2.0;
 /// Lines of Table IV (R143): updates of target, odometry and navigator, minutes.
 const TABLE_IV: [([usize; 3], f64); 4] =
     [([7, 0, 0], 10.0), ([10, 0, 0], 11.0), ([4, 6, 0], 15.0), ([4, 0, 4], 23.0)];
@@ -150,6 +152,12 @@ pub fn drive(
         3 => DriveCommand { motions: motions[..7].to_vec(), ..blind.clone() },
         _ => DriveCommand {
             standoff_m: standoff_m(traverse, scenario.drive.end_distance_m),
+            // The paper drove to within 2 m of the target.
+            tolerance_m: if number == 2 {
+                WITHIN_M - scenario.drive.end_distance_m
+            } else {
+                blind.tolerance_m
+            },
             on_arrival: if number == 4 {
                 vec![ArrivalAction::Look, ArrivalAction::HandOff]
             } else {
