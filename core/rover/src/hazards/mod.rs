@@ -8,12 +8,13 @@
 //! | `points` | points of a stereo pair |
 //! | `grid`, `map`, `moments` | window that wraps around the rover; sums of a cell; plane fit |
 //! | `disc_sums`, `steps` | the disc of the rover's radius around every cell |
+//! | `slope` | the plane of the ground around every cell, above which steps are measured |
 //! | `goodness` | tilt, roughness, step, certainty, goodness; exemption and start |
 //!
 //! The map is inflated: the goodness of a cell is that of the whole disc around it, so that a path is judged by its centre line.
 //!
 //! Departures from domain.md 8.2: cells of 0.10 m instead of 0.20 m and a window of 16 m instead of 10 m; the age of the
-//! observations. Heights are not corrected for an error of the pose between two stops: they fade with the distance driven.
+//! observations; steps are measured above the slope of the ground. Heights are not corrected for an error of the pose between two stops: they fade with the distance driven.
 //!
 //! Frame: site, z down, m. Sources: domain.md 8; papers.md R9, R99–R102.
 
@@ -22,6 +23,7 @@ pub mod grid;
 mod moments;
 pub mod map;
 mod disc_sums;
+mod slope;
 mod steps;
 pub mod goodness;
 pub mod points;

@@ -1,7 +1,8 @@
-//! Steps: the largest difference of the heights of two cells near each other, both inside the disc.
+//! Steps: the largest difference of the heights of two cells near each other above the slope of the ground, both inside the disc.
 //!
 //! ```text
-//! step(p) = max (|h(c) − h(c + o)| − k √(σ²(c) + σ²(c + o)))      c ∈ D_p ∩ (D_p − o),  0 < |o| ≤ reach
+//! step(p) = max (|d(c) − d(c + o)| − k √(σ²(c) + σ²(c + o)))      c ∈ D_p ∩ (D_p − o),  0 < |o| ≤ reach
+//! d(c)    = h(c) − S(c)
 //! s²(c)   = Σz²/n − z̄² − σ²(c)
 //! edge(c) = max(z̄(c) − √3 s(c), z_top(c))
 //! h(c)    = edge(c) where s(c) > face_spread_m + 2 σ(c) and no cell beside c is as high within face_spread_m, else z̄(c)
@@ -11,11 +12,15 @@
 //! Where a cell beside it shows the top, the step to that cell is found anyway, and cells that are partly top and partly ground keep
 //! their mean.
 //!
+//! Without the slope, the uphill side of a rock would be lower than its height above the ground where it stands, by up to the fall of
+//! the ground over `reach`, and its downhill side higher.
+//!
 //! For each offset o the differences form one image, and the maximum over the intersection of both discs is taken row by
 //! row: a run of l cells is covered by two runs of 2^k ≤ l, whose maxima are computed once for the whole image.
 //!
 //! | symbol | meaning |
 //! |---|---|
+//! | S(c) | height of the plane of the ground around c, m (`slope.rs`) |
 //! | z̄(c), σ²(c) | mean height of the n points of cell c, m, and its expected variance, m² |
 //! | s(c) | spread of their heights beyond that error, m |
 //! | k | `step_sigmas` |
@@ -28,6 +33,7 @@ use rayon::prelude::*;
 use super::grid::Disc;
 use super::map::HazardMap;
 use super::settings::HazardSettings;
+use super::slope::slopes;
 
 /// The largest step in the disc around every cell, row by row, m; 0 where no two cells are known.
 pub(super) fn steps(map: &HazardMap, disc: &Disc, reach: &Disc, settings: &HazardSettings) -> Vec<f32> {
@@ -54,15 +60,19 @@ pub(super) fn steps(map: &HazardMap, disc: &Disc, reach: &Disc, settings: &Hazar
     offsets.into_par_iter().map(|offset| largest(&cells, offset, disc)).reduce(nothing, larger)
 }
 
-/// The height of every cell, row by row, m, NaN where unknown.
+/// The height of every cell above the plane of the ground around it, row by row, z down, m, NaN where unknown.
 fn heights(map: &HazardMap, settings: &HazardSettings) -> Vec<f32> {
-    let side = map.grid.side;
+    let (side, cell_m) = (map.grid.side, map.grid.cell_m);
     let mean = |[row, column]: [usize; 2]| {
         let cell = map.cell(row, column);
-        (cell.count() >= settings.weight_min).then(|| cell.mean_height_m())
+        (cell.count() >= settings.weight_min).then(|| {
+            let [x, y, z] = cell.mean();
+            let centre = |number: usize| (number as f64 + 0.5) * cell_m;
+            [centre(row) + x, centre(column) + y, z]
+        })
     };
     let height = |at: [usize; 2]| {
-        let mean_m = mean(at)?;
+        let mean_m = mean(at)?[2];
         let Some(edge_m) = map.upper_edge_m(at[0], at[1], settings.face_spread_m) else {
             return Some(mean_m);
         };
@@ -70,12 +80,13 @@ fn heights(map: &HazardMap, settings: &HazardSettings) -> Vec<f32> {
         let mut near = around(at[0]).flat_map(|row| around(at[1]).map(move |column| [row, column]));
         // z is down.
         let has_top =
-            near.any(|other| mean(other).is_some_and(|top_m| top_m <= edge_m + settings.face_spread_m));
+            near.any(|other| mean(other).is_some_and(|top| top[2] <= edge_m + settings.face_spread_m));
         Some(if has_top { mean_m } else { edge_m })
     };
-    (0..side * side)
-        .map(|index| height([index / side, index % side]).map_or(f32::NAN, |m| m as f32))
-        .collect()
+    let cells = || (0..side * side).map(|index| [index / side, index % side]);
+    let means_m: Vec<Option<[f64; 3]>> = cells().map(mean).collect();
+    let slopes = slopes(&means_m, side, settings);
+    cells().zip(slopes).map(|(at, slope)| height(at).map_or(f32::NAN, |m| m as f32 - slope)).collect()
 }
 
 /// Replaces every value by the larger one of the two.
