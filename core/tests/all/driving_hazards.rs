@@ -151,6 +151,19 @@ fn without_range_data_or_a_safe_path_the_rover_stays_and_says_why() {
 }
 
 #[test]
+fn time_that_the_map_uses_up_ends_the_drive_before_the_rover_moves() {
+    let folder = tempfile::tempdir().unwrap();
+    // The map of the first stop takes 5 minutes.
+    let command = DriveCommand { flight_minutes_max: 2.0, ..command(NavigatorKind::Gestalt) };
+    let mut drive = begin(&scenario(), command, &folder.path().join("drive")).unwrap();
+    to_end(&mut drive);
+    let ending = drive.ending().unwrap();
+    assert_eq!((ending.reason, ending.limit), (StopReason::Time, Some(2.0)));
+    assert!((5.0..7.0).contains(&ending.value.unwrap()), "{ending:?}");
+    assert_eq!((drive.steps.len(), drive.summary().driven_m), (1, 0.0));
+}
+
+#[test]
 fn a_drive_whose_goal_is_a_rock_ends_beside_it_and_says_so() {
     let folder = tempfile::tempdir().unwrap();
     let mut drive =

@@ -21,7 +21,7 @@ use utoipa::ToSchema;
 use sightline_geometry::frames::Pose;
 use sightline_track::target::TrackingState;
 
-use super::command::{GoalRule, SlipCheck};
+use super::command::{DriveCommand, GoalRule, SlipCheck};
 use super::executive::{Cycle, CycleInput};
 use super::limit_cycle;
 use super::next_motion::slip_to;
@@ -156,8 +156,8 @@ pub(super) fn ending(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &Cycle) -
             return end(StopReason::Tilt, report.tilt_deg, command.tilt_max_deg);
         }
     }
-    if cycle.flight_minutes > command.flight_minutes_max {
-        return end(StopReason::Time, cycle.flight_minutes, command.flight_minutes_max);
+    if let Some(ending) = time_up(command, cycle.flight_minutes) {
+        return Some(ending);
     }
     let count = cycle.step + 1 - input.first.step;
     if count >= command.stops_max as usize {
@@ -169,6 +169,12 @@ pub(super) fn ending(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &Cycle) -
     let visits = visits(stops, [input.since(), cycle.step]);
     (visits.len() >= limit_cycle::VISITS_MAX)
         .then(|| Ending::named(StopReason::LimitCycle, Some(limit_cycle::sentence(&visits))))
+}
+
+/// The end of a drive that has taken this time on Mars, min, if that is more than its command allows.
+pub(super) fn time_up(command: &DriveCommand, minutes: f64) -> Option<Ending> {
+    let most = command.flight_minutes_max;
+    (minutes > most).then(|| Ending::beyond(StopReason::Time, minutes, most))
 }
 
 /// Whether all motions of a directed drive were driven; one that a rock or the time cut off has its own reason.

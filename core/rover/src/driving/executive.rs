@@ -18,7 +18,7 @@ use sightline_track::trace::StepTrace;
 use super::active_world::{ActiveWorld, DriveReport, FollowedCycle};
 use super::command::{ArrivalAction, DriveCommand, GoalRule};
 use super::dead_reckoning::Reckoned;
-use super::ending::{Ending, ending, has_driven_all};
+use super::ending::{Ending, ending, has_driven_all, time_up};
 use super::flight_time::{FlightTime, drive_s};
 use super::map_hazards::{StopHazards, body_pair};
 use super::motion::Motion;
@@ -151,7 +151,7 @@ pub fn drive(world: &mut dyn ActiveWorld, input: &CycleInput<'_>, cancel: Cancel
     match cycle.motion {
         Some(motion) => {
             odometry::before_drive(world, input.command)?;
-            let left_s = 60.0 * (input.command.flight_minutes_max - cycle.flight_minutes);
+            let left_s = (60.0 * (input.command.flight_minutes_max - cycle.flight_minutes)).max(0.0);
             cycle.time_up_after = Some(left_s / drive_s(&motion)).filter(|part| *part < 1.0);
             let driven = motion.part(cycle.time_up_after.unwrap_or(1.0));
             cycle.add(world.drive(&driven, cancel)?);
@@ -255,6 +255,11 @@ fn choose_motion(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &mut Cycle, t
             let before_s = cycle.flight.total_s();
             cycle.flight = cycle.flight.with_hazards();
             cycle.flight_minutes += (cycle.flight.total_s() - before_s) / 60.0;
+            if cycle.motion.is_some()
+                && let Some(ending) = time_up(input.command, cycle.flight_minutes)
+            {
+                (cycle.motion, cycle.odometry_alone, cycle.ending) = (None, false, Some(ending));
+            }
         }
     }
 }
