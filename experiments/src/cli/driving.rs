@@ -37,15 +37,24 @@ pub(super) struct Driving {
     /// The navigator that chooses the motions.
     #[arg(long, value_name = "NAME", default_value = "arcs")]
     navigator: NavigatorName,
-    /// Leave out the drives with a fixed goal.
-    #[arg(long)]
-    only_following: bool,
+    /// The drives with one rule of the goal alone.
+    #[arg(long, value_name = "RULE")]
+    only: Option<Rule>,
     /// Keep the drives in this folder, each with its images.
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
     /// What is written to the standard output.
     #[arg(long, default_value = "text")]
     format: Format,
+}
+
+/// A rule of the goal.
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+enum Rule {
+    /// It follows the target.
+    Follows,
+    /// It stays where the designation put it.
+    Fixed,
 }
 
 /// What is written to the standard output.
@@ -77,9 +86,12 @@ impl Driving {
         let folder = self.out.clone().unwrap_or_else(|| unkept.clone());
         let seeds: Vec<u64> = (self.of.seed..self.of.seed + self.worlds).collect();
         let settings = self.of.settings()?;
-        let rules = [GoalRule::FollowsTarget, GoalRule::Fixed];
-        let count = if self.only_following { 1 } else { 2 };
-        let all = seeds.len() * count;
+        let rules = match self.only {
+            None => vec![GoalRule::FollowsTarget, GoalRule::Fixed],
+            Some(Rule::Follows) => vec![GoalRule::FollowsTarget],
+            Some(Rule::Fixed) => vec![GoalRule::Fixed],
+        };
+        let all = seeds.len() * rules.len();
         let progress = Mutex::new((0, Progress::new("drive")));
         let tell = || {
             let mut progress = progress.lock().unwrap_or_else(PoisonError::into_inner);
@@ -87,7 +99,7 @@ impl Driving {
             let done = progress.0;
             progress.1.tell(done, all);
         };
-        for goal in rules.into_iter().take(count) {
+        for goal in rules {
             let command = DriveCommand {
                 standoff_m: self.standoff,
                 tolerance_m: self.tolerance,
