@@ -281,7 +281,7 @@ fn prepare_stop(
             }
         }
         let mut world = lock(&driven.world);
-        executive::point_mast(&mut *world, &last.update)?;
+        executive::point_mast(&mut *world, command, &last.update)?;
         world.put_off(Some(CycleStage::Capture))?;
     }
     if !reaches(CycleStage::Capture) {

@@ -28,7 +28,7 @@ use sightline_track::trace::{StepKind, StepTrace};
 
 use crate::begun::Begun;
 use crate::pair::{self, FurtherCamera, FurtherImages, StopPair};
-use crate::sight::{has_stayed, not_searched, pointing};
+use crate::sight::{is_another_look, not_searched, pointing};
 use crate::visual_odometry::{MeasuredMotion, pose_change_error};
 
 /// The stops of a drive, as the stages see them.
@@ -259,7 +259,7 @@ fn computed_step(
         site_from_rover: &site_from_rover,
         stereo: stops.stereo(),
         shared: pair.shared,
-        place: place(stops, step, camera, settings),
+        place: place(stops, step, target.designation, settings),
         lost_count: lost_count(last.state),
         was_found: last.state == TrackingState::Tracking,
         settings,
@@ -366,9 +366,9 @@ fn check_pixel(designation: Designation, left: &Camera) -> Result<Pixel> {
 }
 
 /// A stop among those of its drive.
-fn place(stops: &dyn Stops, step: usize, camera: Option<CameraName>, settings: &Settings) -> Place {
+fn place(stops: &dyn Stops, step: usize, designation: Designation, settings: &Settings) -> Place {
     let share = settings.limits.same_camera_focal_share;
-    let left = |step: usize| pair::of_stop(stops, step, camera).ok().map(|pair| pair.left);
+    let left = |step: usize| pair::of_stop(stops, step, designation.camera).ok().map(|pair| pair.left);
     // A stop that lacks the pair changes nothing.
     let changes =
         |from: usize, to: usize| left(from).zip(left(to)).is_some_and(|(a, b)| !is_same_pair(a, b, share));
@@ -378,7 +378,11 @@ fn place(stops: &dyn Stops, step: usize, camera: Option<CameraName>, settings: &
     Place {
         step,
         is_hand_over: step > 0 && changes(step - 1, step),
-        is_last_of_pair: if is_driven { has_stayed(stops, step) } else { is_last || changes(step, step + 1) },
+        is_last_of_pair: if is_driven {
+            is_another_look(stops, step, designation)
+        } else {
+            is_last || changes(step, step + 1)
+        },
     }
 }
 

@@ -2,7 +2,7 @@
 
 use sightline_geometry::frames::Point3;
 use sightline_track::stages::point_mast::{self, Pointing};
-use sightline_track::target::Target;
+use sightline_track::target::{Designation, Target};
 use sightline_track::trace::StepTrace;
 
 use crate::begun::Begun;
@@ -44,7 +44,7 @@ pub(crate) fn not_searched(
 }
 
 /// Whether both cameras of a pair show a point of the rover frame, and some ground around it.
-fn is_in_view(pair: &StopPair<'_>, point_in_rover: &Point3) -> bool {
+pub(crate) fn is_in_view(pair: &StopPair<'_>, point_in_rover: &Point3) -> bool {
     [pair.left, pair.right].into_iter().all(|camera| {
         let [width, height] = camera.size.map(f64::from);
         let margin_px = VIEW_MARGIN * width;
@@ -53,6 +53,13 @@ fn is_in_view(pair: &StopPair<'_>, point_in_rover: &Point3) -> bool {
                 && (margin_px..height - margin_px).contains(&pixel.y)
         })
     })
+}
+
+/// Whether a stop is one more look at a target: the rover stands where it stood at the stop before, where the mast was pointed at that
+/// target, too.
+pub(crate) fn is_another_look(stops: &dyn Stops, step: usize, target: Designation) -> bool {
+    has_stayed(stops, step)
+        && [step - 1, step].into_iter().all(|step| stops.mast_target(step) == Some(target))
 }
 
 /// Whether the rover stands where it stood at the stop before.

@@ -154,6 +154,7 @@ impl Session {
         if let Some(present) = self.steering.as_ref().filter(|present| present.target == steering.target) {
             steering.command.since = steering.command.since.or(present.command.since);
         }
+        steering.command.waiting = self.waiting(&steering.then);
         check_command(traverse, &steering.command, &first.trace)?;
         if steering.pause.is_some() && steering.pause_at.is_none() {
             let problem = "a pause before or after a stage needs the stop, in `pause_at`";

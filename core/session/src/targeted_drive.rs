@@ -7,12 +7,12 @@ use crate::driving::{DriveSummary, check_command, summary};
 use crate::step::RunStep;
 use crate::stop_cause::{Explained, StopExplanation};
 use crate::track::{self, NextStep};
-use crate::visits::Visit;
+use crate::visits::{Visit, waiting_target};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
 use sightline_recordings::DrivenTraverse;
 use sightline_rover::driving::executive::{self, CycleInput};
-use sightline_rover::driving::{Cycle, DriveCommand, Ending, HazardMaps};
+use sightline_rover::driving::{Cycle, DriveCommand, Ending, HazardMaps, WaitingTarget};
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
 
@@ -81,6 +81,7 @@ impl TargetedDrive {
         let Some(steps) = all.pop_front() else {
             return Err(Error::Target("a drive needs a target".to_owned()));
         };
+        let command = DriveCommand { waiting: waiting(&all), ..command };
         check_command(world.traverse(), &command, &steps[0].trace)?;
         let (cycles, maps, visits) = (Vec::new(), HazardMaps::default(), Vec::new());
         let settings = settings.clone();
@@ -166,6 +167,7 @@ impl TargetedDrive {
             return false;
         }
         let Some(steps) = self.then.pop_front() else { return false };
+        self.command.waiting = waiting(&self.then);
         self.command.since = self.steps.last().map(|last| last.step);
         self.steps = steps;
         self.target += 1;
@@ -202,4 +204,9 @@ impl TargetedDrive {
         let tracked = (&self.steps[..], &self.settings);
         Explained::default().of(traverse, &self.command, tracked, &self.cycles, maps)
     }
+}
+
+/// The targets of these steps as those that wait.
+fn waiting(then: &VecDeque<Vec<Arc<RunStep>>>) -> Vec<WaitingTarget> {
+    then.iter().filter_map(|steps| Some(waiting_target(&steps.first()?.trace))).collect()
 }

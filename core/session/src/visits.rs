@@ -1,7 +1,7 @@
 //! A drive to several targets, one after the other (R207–R209): which were visited, and the next one.
 //!
 //! All targets are tracked at every stop while the rover drives to one of them. Those that are out of view, as the mast is pointed
-//! at that one, are carried by the pose estimate. A target that the tracker gave up, or whose goal cannot be reached, is dropped;
+//! at that one, are carried by the pose estimate until the mast looks at them. A target that the tracker gave up, or whose goal cannot be reached, is dropped;
 //! what concerns the rover itself (slip, tilt, a stall, time) ends the whole drive.
 
 use std::sync::Arc;
@@ -15,7 +15,8 @@ use crate::step::RunStep;
 use crate::stop_cause::StopExplanation;
 use sightline_geometry::error::{Error, Result};
 use sightline_recordings::DrivenTraverse;
-use sightline_rover::driving::{DriveCommand, Ending, StopReason};
+use sightline_rover::driving::{DriveCommand, Ending, StopReason, WaitingTarget};
+use sightline_track::trace::StepTrace;
 
 /// A target that the rover was sent to, and how that part of the drive ended.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -65,6 +66,15 @@ impl Visit {
     }
 }
 
+/// A target that waits, by the step at which it was designated.
+pub(crate) fn waiting_target(first: &StepTrace) -> WaitingTarget {
+    let target = &first.update.target;
+    WaitingTarget {
+        designation: target.designation,
+        in_site_m: target.initial_position_in_site.coords.into(),
+    }
+}
+
 impl Session {
     /// Notes how the drive to its target ended at the last stop, and `why`, and sends the rover to the next one; returns the target and run
     /// that drive now. `None` where there is no next one, or the rover cannot drive on.
@@ -94,9 +104,17 @@ impl Session {
         let Some((target, run)) = then.find_map(|target| Some((target, self.newest_run(target)?))) else {
             return Ok(None);
         };
-        let command = DriveCommand { since: Some(until), ..steering.command.clone() };
-        self.steering = Some(Steering { target, run, command, then: then.collect(), ..steering });
+        let then: Vec<usize> = then.collect();
+        let waiting = self.waiting(&then);
+        let command = DriveCommand { since: Some(until), waiting, ..steering.command.clone() };
+        self.steering = Some(Steering { target, run, command, then, ..steering });
         Ok(Some((target, run)))
+    }
+
+    /// The targets with these numbers as those that wait; one that is not located yet is left out.
+    pub(crate) fn waiting(&self, then: &[usize]) -> Vec<WaitingTarget> {
+        let first = |target: &usize| self.run(*target, self.newest_run(*target)?).ok()?.steps.first();
+        then.iter().filter_map(|target| Some(waiting_target(&first(target)?.trace))).collect()
     }
 
     /// The number of a target's newest run; `None` for a target that was removed.

@@ -102,7 +102,7 @@ fn a_world_paused_before_any_stage_goes_on_with_the_same_state_and_images() {
             "the mast is not pointed"
         );
         if put_off != Some(CycleStage::PointMast) {
-            executive::point_mast(&mut drive.world, &last.update).unwrap();
+            executive::point_mast(&mut drive.world, &drive.command, &last.update).unwrap();
             drive.world.put_off(put_off).unwrap();
             assert_eq!(drive.world.state()[2].mast_angles, state[2].mast_angles);
         }
@@ -119,7 +119,7 @@ fn a_world_paused_before_any_stage_goes_on_with_the_same_state_and_images() {
             None => assert_eq!(snapshot.capture(2).unwrap(), images),
         }
         if put_off == Some(CycleStage::PointMast) {
-            executive::point_mast(&mut drive.world, &last.update).unwrap();
+            executive::point_mast(&mut drive.world, &drive.command, &last.update).unwrap();
         }
         odometry::run(&mut drive.world, &command(), 2, Cancel::default()).unwrap();
         drive.world.put_off(None).unwrap();

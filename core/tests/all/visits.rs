@@ -7,7 +7,7 @@ use sightline_recordings::DrivenTraverse;
 use sightline_rover::driving::{DriveCommand, StopReason};
 use sightline_session::targeted_drive::TargetedDrive;
 use sightline_track::settings::Settings;
-use sightline_track::target::Designation;
+use sightline_track::target::{Designation, TrackingState};
 use sightline_world::scenario::Occluder;
 use sightline_world::{Scenario, choose_targets, library};
 
@@ -53,6 +53,21 @@ fn targets_are_visited_in_turn_and_a_lost_one_is_dropped() {
     // While the rover drove to the first one, the second left the view of the mast's cameras and was carried.
     let carried = drive.steps.iter().filter(|step| step.is_out_of_view()).count();
     assert!(carried > 0 && drive.steps[..first.until].iter().all(|step| !step.update.state.is_lost()));
+    // It was looked at on the way, at stops of their own.
+    let looks: Vec<usize> = drive.cycles[..first.until]
+        .iter()
+        .filter(|cycle| cycle.looks_at.is_some())
+        .map(|cycle| cycle.step)
+        .collect();
+    assert!(!looks.is_empty() && looks.len() < first.until / 3, "{looks:?}");
+    for step in looks {
+        assert_eq!(drive.cycles[step].motion, None);
+        assert!(
+            drive.steps[step + 1].why_not_searched().is_none()
+                && drive.steps[step + 1].update.state == TrackingState::Tracking,
+            "{step}"
+        );
+    }
     // It is looked at before the rover drives to it: two stops at the place of the first goal.
     let [here, looked] = [first.until, first.until + 1].map(|step| &drive.steps[step]);
     assert!(here.is_out_of_view() && looked.why_not_searched().is_none());

@@ -111,6 +111,9 @@ pub(super) struct Drive {
     /// (0.5 turn 20), separated by commas.
     #[arg(long, value_name = "MOTION,…", value_delimiter = ',', allow_hyphen_values = true)]
     motions: Vec<Motion>,
+    /// Whether the mast also looks at the targets that are visited afterwards.
+    #[arg(long, value_name = "true|false", default_value_t = true, action = clap::ArgAction::Set)]
+    look_at_waiting: bool,
     /// An action after arrival; can be given more than once.
     #[arg(long, value_name = "ACTION")]
     on_arrival: Vec<OnArrival>,
@@ -317,6 +320,7 @@ impl Drive {
             refusals_max: self.refusals_max,
             flight_minutes_max: self.minutes,
             motions: self.motions.clone(),
+            look_at_waiting: self.look_at_waiting,
             on_arrival: self.on_arrival.iter().map(|action| action.action()).collect(),
             final_standoff_m: self.final_standoff,
             ..DriveCommand::default()

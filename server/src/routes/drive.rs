@@ -128,11 +128,13 @@ fn add(
     let then = new.then.clone();
     let steering = Steering { target, run, command, then, pause_at: new.pause_at, pause: new.pause };
     let open = live.traverse();
-    let (saved, last) = live.with(|session| {
+    let (saved, last, steering) = live.with(|session| {
         let steps = &session.run(target, run).map_err(|error| ApiError::from(error).about_path())?.steps;
         // Refused before a world is made.
-        session.clone().steer(&open.traverse, steering.clone())?;
-        Ok::<_, ApiError>((session.saved(), steps.last().map_or(0, |last| last.step)))
+        let mut steered = session.clone();
+        steered.steer(&open.traverse, steering.clone())?;
+        let steering = steered.steering.unwrap_or(steering);
+        Ok::<_, ApiError>((session.saved(), steps.last().map_or(0, |last| last.step), steering))
     })?;
     let designated = saved.targets[target].designation.step;
     let from_step = from_step(&open, new, designated, last)?;

@@ -283,7 +283,10 @@ fn buttons(ui: &mut Ui, state: &State, drive: &DriveView, out: &mut Vec<Command>
         state.cursor.target == Some(steering.target) && state.cursor.run == steering.run
     });
     let is_other_command = drive.steering.as_ref().is_some_and(|steering| {
-        steering.command != state.driving.command || steering.then != state.driving.then
+        // The server puts the waiting targets there.
+        let waiting = steering.command.waiting.clone();
+        let form = DriveCommand { waiting, ..state.driving.command.clone() };
+        steering.command != form || steering.then != state.driving.then
     });
     ui.horizontal_wrapped(|ui| {
         let mut button = |name: &str, is_on: bool, help: &str, ask: Ask| {
@@ -358,7 +361,7 @@ fn decisions(ui: &mut Ui, state: &State, drive: &DriveView, out: &mut Vec<Comman
                 (Some(motion), _) => words::motion(motion),
                 (None, Some(ending)) => ending.reason.word().to_owned(),
                 (None, None) if is_undecided(drive, cycle.step) => "not chosen yet".to_owned(),
-                (None, None) => "looks again".to_owned(),
+                (None, None) => visits::look(state, cycle),
             };
             ui.label(theme::label(motion).size(12.0));
             ui.label(theme::number(words::report(cycle)));

@@ -4,7 +4,7 @@ use egui::{Grid, Label, ScrollArea, Ui};
 use sightline_rover::driving::{Cycle, Motion};
 
 use crate::command::Stage;
-use crate::driving::{paths, pause, words};
+use crate::driving::{paths, pause, visits, words};
 use crate::panels::{self, digits};
 use crate::state::{State, run_letter};
 use crate::theme;
@@ -13,7 +13,7 @@ use crate::theme;
 pub(crate) fn show(ui: &mut Ui, state: &State) {
     let (stage, step) = (state.stage(), state.cursor.step);
     let rows = match state.cycle_at(step).filter(|_| state.is_decided(stage)) {
-        Some(cycle) => record(cycle, stage),
+        Some(cycle) => record(state, cycle, stage),
         None => {
             panels::missing(ui, "", &missing(state, stage));
             return;
@@ -58,10 +58,10 @@ fn missing(state: &State, stage: Stage) -> String {
 }
 
 /// The values of a stage, each with its name and unit.
-fn record(cycle: &Cycle, stage: Stage) -> Vec<(&'static str, String)> {
+fn record(state: &State, cycle: &Cycle, stage: Stage) -> Vec<(&'static str, String)> {
     match stage {
         Stage::SET_GOAL => goal(cycle),
-        Stage::SELECT_PATH => motion(cycle),
+        Stage::SELECT_PATH => motion(state, cycle),
         _ => report(cycle),
     }
 }
@@ -79,11 +79,11 @@ fn goal(cycle: &Cycle) -> Vec<(&'static str, String)> {
     ]
 }
 
-fn motion(cycle: &Cycle) -> Vec<(&'static str, String)> {
+fn motion(state: &State, cycle: &Cycle) -> Vec<(&'static str, String)> {
     let mut rows = match (&cycle.motion, &cycle.ending) {
         (Some(motion), _) => vec![("motion", words::motion(motion))],
         (None, Some(ending)) => vec![("the drive ends", words::ending(ending))],
-        (None, None) => vec![("motion", "none: the rover looks again".to_owned())],
+        (None, None) => vec![("motion", format!("none: the rover {}", visits::look(state, cycle)))],
     };
     match cycle.motion {
         Some(Motion::Arc { length_m, curvature_per_m }) => {

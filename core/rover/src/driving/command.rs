@@ -10,6 +10,7 @@ use sightline_geometry::frames::Point3;
 use super::motion::Motion;
 use super::odometry::OdometryPair;
 use super::select_path::{ArcNavigator, Navigator};
+use super::waiting::WaitingTarget;
 use crate::navigation::{HazardNavigator, NavigatorPreset};
 use crate::visual_odometry::{OdometryMode, OdometryPreset};
 
@@ -105,6 +106,9 @@ pub const HAZARD_CAMERAS_MAX: usize = 4;
 /// Most actions after arrival.
 const ACTIONS_MAX: usize = 10;
 
+/// Most targets to which the rover drives afterwards.
+const WAITING_MAX: usize = 20;
+
 /// Most motions of a directed drive, and the longest of them, m.
 const MOTIONS_MAX: usize = 200;
 const MOTION_MAX_M: f64 = 20.0;
@@ -162,6 +166,12 @@ pub struct DriveCommand {
     /// The drive has then ended with the last of them, and the target is tracked along.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub motions: Vec<Motion>,
+    /// The targets to which the rover drives afterwards; the server and the command line put them here from their list (none; 20 at most).
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub waiting: Vec<WaitingTarget>,
+    /// Whether the mast also looks at a waiting target, at a stop of its own, once the rover has moved by `step_fraction` of the distance
+    /// to it since it was last in view (true).
+    pub look_at_waiting: bool,
     /// Actions after arrival, in this order (none; 10 at most). A look and the hand-off are one more stop each, at which the rover
     /// stays.
     pub on_arrival: Vec<ArrivalAction>,
@@ -193,6 +203,8 @@ impl Default for DriveCommand {
             tilt_max_deg: 30.0,
             flight_minutes_max: 480.0,
             motions: Vec::new(),
+            waiting: Vec::new(),
+            look_at_waiting: true,
             on_arrival: Vec::new(),
             final_standoff_m: 1.3,
         }
@@ -237,6 +249,7 @@ impl DriveCommand {
         within("refusals_max", f64::from(self.refusals_max.unwrap_or(0)), 0.0, 1000.0)?;
         within("tilt_max_deg", self.tilt_max_deg, 1.0, 45.0)?;
         within("flight_minutes_max", self.flight_minutes_max, 1.0, 10_000.0)?;
+        within("waiting (number of targets)", self.waiting.len() as f64, 0.0, WAITING_MAX as f64)?;
         within("motions (number of motions)", self.motions.len() as f64, 0.0, MOTIONS_MAX as f64)?;
         for (index, motion) in self.motions.iter().enumerate() {
             let (length_m, turn_rad) = motion.length_and_turn();

@@ -13,6 +13,7 @@ use sightline_geometry::odometry_error::PoseChangeError;
 use sightline_track::settings::Settings;
 use sightline_track::stages::predict;
 use sightline_track::stages::update::Updated;
+use sightline_track::target::Designation;
 use sightline_track::trace::StepTrace;
 
 use super::active_world::{ActiveWorld, DriveReport, FollowedCycle};
@@ -27,6 +28,7 @@ use super::odometry::{self, OdometryPair};
 use super::path_choice::PathChoice;
 use super::select_path::Navigator;
 use super::set_goal::{Goal, set_goal};
+use super::waiting;
 use crate::pipeline::{self, StepChanges, Stops};
 use crate::visual_odometry::pose_change_error;
 
@@ -62,6 +64,9 @@ pub struct Cycle {
     /// Motions of a directed drive that were begun, the one decided here included.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub motions_begun: u32,
+    /// The waiting target at which the mast looks next, while the rover stays; null for none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub looks_at: Option<Designation>,
     /// The action after arrival that was decided here; null for none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub action: Option<ArrivalAction>,
@@ -134,7 +139,7 @@ fn arrive(world: &mut dyn ActiveWorld, input: &CycleInput<'_>, cancel: Cancel<'_
             return Ok(());
         }
     }
-    point_mast(world, &input.last.update)?;
+    point_mast(world, input.command, &input.last.update)?;
     if is_before { Ok(()) } else { odometry::run(world, input.command, step, cancel) }
 }
 
@@ -163,7 +168,12 @@ pub fn drive(world: &mut dyn ActiveWorld, input: &CycleInput<'_>, cancel: Cancel
             let to = body_pair(world.stops(), cycle.step, input.command)?;
             world.hand_over(to)?;
         }
-        None => world.stay()?,
+        None => {
+            world.stay()?;
+            if let Some(target) = cycle.looks_at {
+                world.keep_mast_target(target)?;
+            }
+        }
     }
     let designation = input.first.update.target.designation;
     world.keep_decision(&FollowedCycle { designation, command: input.command, cycle: &cycle });
@@ -200,14 +210,16 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
         report: None,
         arrival_actions,
         motions_begun: before_here.map_or(0, |before| before.motions_begun),
+        looks_at: None,
         action: None,
         flight: time,
         flight_minutes,
         ending: None,
     };
     if input.last.is_out_of_view() {
-        // The mast was pointed at another target: look at this one first.
+        // The mast was pointed at another target: look at this one first, or before it at another one that waits.
         cycle.ending = ending(stops, input, &cycle);
+        cycle.looks_at = looks_at(stops, input, &cycle);
         return cycle;
     }
     begin_action(input, &mut cycle);
@@ -219,10 +231,18 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
         return cycle;
     }
     cycle.ending = ending(stops, input, &cycle);
-    if cycle.ending.is_none() {
+    cycle.looks_at = looks_at(stops, input, &cycle);
+    if cycle.ending.is_none() && cycle.looks_at.is_none() {
         choose_motion(stops, input, &mut cycle, &target_in_site);
     }
     cycle
+}
+
+/// The waiting target that the mast looks at before the rover moves.
+fn looks_at(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &Cycle) -> Option<Designation> {
+    let may_look = cycle.ending.is_none() && !input.last.is_odometry_alone();
+    let due = waiting::due(stops, input.command, cycle.step).filter(|_| may_look)?;
+    Some(due.designation)
 }
 
 /// Begins the next action after arrival, if the rover has arrived and one is left.
@@ -299,19 +319,25 @@ fn target_in_site(input: &CycleInput<'_>, stops: &dyn Stops) -> Point3 {
     stops.site_from_rover(from.step) * from.update.target.position_in_rover
 }
 
-/// Points the mast of the last stop at the prediction from the stop before, and exposes around it.
+/// Points the mast of the last stop at the prediction from the stop before, or at the waiting target that it is to look at, and exposes
+/// around it.
 ///
 /// # Errors
 /// A stop that cannot be stored.
-pub fn point_mast(world: &mut dyn ActiveWorld, last: &Updated) -> Result<()> {
+pub fn point_mast(world: &mut dyn ActiveWorld, command: &DriveCommand, last: &Updated) -> Result<()> {
     let stops = world.stops();
     let [then, now] = [last.target.step, last.target.step + 1].map(|step| stops.site_from_rover(step));
-    let predicted =
-        predict::predict(&last.target, &then, &now, &PoseChangeError::Modelled(stops.odometry_error()));
-    let wanted = stops.mast().and_then(|mast| mast.point_left_centre_at(&predicted.position_in_rover));
-    world.keep_mast_target(last.target.designation)?;
+    let (target, in_rover) = match waiting::looked_at(stops, command, last.target.step + 1) {
+        Some(waiting) => (waiting.designation, waiting.in_rover(&now)),
+        None => {
+            let error = PoseChangeError::Modelled(stops.odometry_error());
+            (last.target.designation, predict::predict(&last.target, &then, &now, &error).position_in_rover)
+        }
+    };
+    let wanted = stops.mast().and_then(|mast| mast.point_left_centre_at(&in_rover));
+    world.keep_mast_target(target)?;
     world.point_mast(wanted)?;
     let (left, _) = world.stops().cameras(last.target.step + 1);
-    let around = left.project(&predicted.position_in_rover);
+    let around = left.project(&in_rover);
     world.expose(around)
 }

@@ -19,6 +19,7 @@ pub mod odometry;
 pub mod path_choice;
 pub mod select_path;
 pub mod set_goal;
+pub mod waiting;
 
 pub use active_world::{ActiveWorld, DriveReport, FollowedCycle, Stall};
 pub use command::{
@@ -34,3 +35,4 @@ pub use odometry::OdometryPair;
 pub use path_choice::{Candidate, PathChoice, PathTerms, Veto};
 pub use select_path::{ArcNavigator, Navigator, PathInput};
 pub use set_goal::Goal;
+pub use waiting::WaitingTarget;
