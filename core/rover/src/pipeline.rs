@@ -374,16 +374,11 @@ fn place(stops: &dyn Stops, step: usize, designation: Designation, settings: &Se
         |from: usize, to: usize| left(from).zip(left(to)).is_some_and(|(a, b)| !is_same_pair(a, b, share));
     let is_last = step + 1 >= stops.stop_count();
     // Where the mast was pointed at a target, the rover was driven: which stop will be the last is not known there.
-    let is_driven = stops.mast_target(step).is_some();
-    Place {
-        step,
-        is_hand_over: step > 0 && changes(step - 1, step),
-        is_last_of_pair: if is_driven {
-            is_another_look(stops, step, designation)
-        } else {
-            is_last || changes(step, step + 1)
-        },
-    }
+    let is_last_of_pair = match stops.mast_target(step) {
+        Some(_) => is_another_look(stops, step, designation),
+        None => is_last || changes(step, step + 1),
+    };
+    Place { step, is_hand_over: step > 0 && changes(step - 1, step), is_last_of_pair }
 }
 
 /// Whether two left cameras are the same one, however it points: equal image size and kind of model, focal lengths that
