@@ -1,6 +1,7 @@
 //! K9's three targets in one drive on commands: visited in turn with hazard avoidance, each handed over to the hazcams.
 //!
 //! ```text
+//! designation  │ x_0 − x_true │           at the first stop, by stereo
 //! tracker      │ x_arrived − x_true │     by features, at the stop at which the rover arrives
 //! first view   │ x_look − x_true │        after the registration of the next pair to the view of the designation
 //! hand-off     │ x_handed − x_look │      what the transfer to the hazcams added: the rover stands still
@@ -43,6 +44,8 @@ pub struct K9Visit {
     pub stops: usize,
     /// Stops of this part at which the update was bad or the target lost.
     pub bad_stops: usize,
+    /// Error of the designation, which an incremental tracker keeps, m (R215).
+    pub designation_m: Option<f64>,
     /// Error at the stop at which it arrived, or else at the last, m.
     pub tracker_m: Option<f64>,
     /// Error of the registration to the first view, m; null if it did not arrive.
@@ -116,6 +119,7 @@ fn visit(day: &'static str, seed: u64, drive: &TargetedDrive) -> K9Visit {
         reason: drive.ending().map_or_else(String::new, |ending| ending.reason.word().to_owned()),
         stops: own.len(),
         bad_stops: own.iter().filter(is_bad).count(),
+        designation_m: drive.steps.first().and_then(|first| Some(first.truth.as_ref()?.err_m)),
         tracker_m: at(actions).and_then(error_m),
         first_view_m: look.and_then(error_m),
         hand_off_m: handed.zip(look).filter(|_| is_used).map(|(a, b)| (position(a) - position(b)).norm()),

@@ -125,13 +125,14 @@ impl K9DayStudy {
             |metres: Option<f64>| metres.map_or_else(|| "–".to_owned(), |m| format!("{:.2} cm", 100.0 * m));
         let why = visit.failure.as_ref().map_or_else(String::new, |failure| format!(" ({failure})"));
         terminal::line(&format!(
-            "{} seed {} target {}: {}, {} stops, {} of them bad; tracker {}, first view {}, hand-off {}{why}, after it {}, touch {} beside; {:.0} min",
+            "{} seed {} target {}: {}, {} stops, {} of them bad; designation {}, tracker {}, first view {}, hand-off {}{why}, after it {}, touch {} beside; {:.0} min",
             visit.day,
             visit.seed,
             visit.target,
             visit.reason,
             visit.stops,
             visit.bad_stops,
+            cm(visit.designation_m),
             cm(visit.tracker_m),
             cm(visit.first_view_m),
             cm(visit.hand_off_m),
