@@ -75,6 +75,13 @@ async fn targets_are_visited_in_turn_as_by_the_command_line_and_a_fault_drops_on
     assert_eq!(branched["faults"][0]["kind"], "occluder");
     assert_eq!(driven["cycles"][0], branched["cycles"][0], "the stops before are shared");
 
+    // From a stop before the rover was sent to it, the second target is approached from the place of its designation.
+    let begin = format!("sessions/{session}/targets/1/runs/0/drive");
+    let early = json!({ "command": { "tolerance_m": 0.02, "stops_max": 4 }, "from_step": 2 });
+    let early = server.post(&begin, &early).await.expect(201)["id"].as_str().unwrap().to_owned();
+    let ended = waited(&server, &early, has_ended).await;
+    assert_eq!(ended["steering"]["command"]["since"], Value::Null, "{}", ended["steering"]);
+
     drop(server);
     let again = TestServer::open(&path, folder.path());
     for (session, before) in [(&session, &driven), (&branch, &branched)] {

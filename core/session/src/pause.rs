@@ -95,7 +95,9 @@ impl Steering {
         }
         match halt.before {
             CycleStage::SetGoal => drop(cycles.pop()),
-            CycleStage::SelectPath => (last.motion, last.choice, last.ending) = (None, None, None),
+            CycleStage::SelectPath => {
+                (last.motion, last.choice, last.looks_at, last.ending) = (None, None, None, None);
+            }
             _ => {}
         }
     }

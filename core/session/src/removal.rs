@@ -25,7 +25,12 @@ impl Session {
     /// # Errors
     /// [`Error::Request`] when there is no such target.
     pub fn remove_target(&mut self, target: usize) -> Result<()> {
-        self.target_mut(target)?.removed = true;
+        let record = self.target_mut(target)?;
+        record.removed = true;
+        let designation = record.designation;
+        if let Some(steering) = &mut self.steering {
+            steering.command.waiting.retain(|waiting| waiting.designation != designation);
+        }
         if self.cursor.target == Some(target) {
             let other = self.targets.iter().rposition(|record| !record.removed);
             self.cursor = Cursor { target: other, run: 0, step: self.cursor.step };

@@ -185,7 +185,7 @@ impl TargetedDrive {
         let (Some(_), Some(first), Some(last)) = (ending, self.steps.first(), self.steps.last()) else {
             return Err(Error::Request("the drive cannot go on under another command".to_owned()));
         };
-        let command = DriveCommand { since: Some(last.step), ..command };
+        let command = DriveCommand { since: Some(last.step), waiting: waiting(&self.then), ..command };
         check_command(self.world.traverse(), &command, &first.trace)?;
         self.command = command;
         // The decision of this stop is made anew.

@@ -15,7 +15,7 @@ use crate::step::RunStep;
 use crate::stop_cause::StopExplanation;
 use sightline_geometry::error::{Error, Result};
 use sightline_recordings::DrivenTraverse;
-use sightline_rover::driving::{DriveCommand, Ending, StopReason, WaitingTarget};
+use sightline_rover::driving::{DriveCommand, Ending, StopReason, WAITING_MAX, WaitingTarget};
 use sightline_track::trace::StepTrace;
 
 /// A target that the rover was sent to, and how that part of the drive ended.
@@ -127,6 +127,13 @@ impl Session {
     /// # Errors
     /// [`Error::Setting`] that names the entry.
     pub(crate) fn check_then(&self, target: usize, then: &[usize]) -> Result<()> {
+        if then.len() > WAITING_MAX {
+            let problem = format!(
+                "{} targets are more than {WAITING_MAX}, the most that a drive visits afterwards",
+                then.len()
+            );
+            return Err(Error::setting("then", problem));
+        }
         for (index, next) in then.iter().enumerate() {
             let refuse = |problem: String| Err(Error::setting(format!("then[{index}]"), problem));
             if self.target(*next).is_err() {

@@ -83,8 +83,6 @@ pub fn drive(day: &'static str, images: Images, folder: &Path, cancel: Cancel<'_
     let command = DriveCommand {
         navigator: NavigatorKind::Morphin,
         on_arrival: vec![ArrivalAction::Look, ArrivalAction::HandOff],
-        // Looks at the rocks that wait are stops, too.
-        stops_max: 400,
         // The times of a Mars rover are not those of K9.
         flight_minutes_max: 10_000.0,
         ..DriveCommand::default()

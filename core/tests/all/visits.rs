@@ -19,12 +19,12 @@ fn scenario() -> Scenario {
     scenario
 }
 
-fn begin(scenario: &Scenario, count: usize, folder: &Path) -> TargetedDrive {
+fn begin(scenario: &Scenario, (count, look_at_waiting): (usize, bool), folder: &Path) -> TargetedDrive {
     let world = DrivenTraverse::begin(scenario, folder, Cancel::default()).unwrap();
     let traverse = world.traverse();
     let pixels = choose_targets(traverse.world().unwrap(), scenario, traverse.index());
     let targets: Vec<Designation> = pixels[..count].iter().map(|pixel| Designation::new(0, *pixel)).collect();
-    let command = DriveCommand { tolerance_m: 0.02, ..DriveCommand::default() };
+    let command = DriveCommand { tolerance_m: 0.02, look_at_waiting, ..DriveCommand::default() };
     TargetedDrive::begin_to(world, &targets, command, &Settings::default(), Cancel::default()).unwrap()
 }
 
@@ -41,7 +41,7 @@ fn to_end(drive: &mut TargetedDrive) {
 #[test]
 fn targets_are_visited_in_turn_and_a_lost_one_is_dropped() {
     let folder = tempfile::tempdir().unwrap();
-    let mut drive = begin(&scenario(), 2, &folder.path().join("two"));
+    let mut drive = begin(&scenario(), (2, true), &folder.path().join("two"));
     to_end(&mut drive);
     println!("{:#?}", drive.visits);
     let [first, second] = &drive.visits[..] else { panic!("two visits") };
@@ -73,13 +73,18 @@ fn targets_are_visited_in_turn_and_a_lost_one_is_dropped() {
     assert!(here.is_out_of_view() && looked.why_not_searched().is_none());
     assert_eq!(drive.cycles[first.until].motion, None);
 
+    // Without looks on the way.
+    let mut drive = begin(&scenario(), (2, false), &folder.path().join("without"));
+    while drive.advance(&Settings::default(), Cancel::default()).unwrap() {}
+    assert!(drive.cycles.iter().all(|cycle| cycle.looks_at.is_none()) && drive.steps.len() <= first.until);
+
     // From the stop at which it is looked at, a wall hides the second target until it is given up.
     let mut hidden = scenario();
-    let from_stop = u32::try_from(first.until).unwrap() + 1;
+    let from_stop = u32::try_from(drive.steps.len()).unwrap();
     let wall =
         Occluder { from_stop, to_stop: from_stop + 2, at: 0.3, width_m: 10.0, height_m: 5.0, aside_m: 0.0 };
     hidden.events.occluders.push(wall);
-    let mut drive = begin(&hidden, 3, &folder.path().join("three"));
+    let mut drive = begin(&hidden, (3, false), &folder.path().join("three"));
     to_end(&mut drive);
     println!("{:#?}", drive.visits);
     let reasons: Vec<StopReason> = drive.visits.iter().map(|visit| visit.reason).collect();

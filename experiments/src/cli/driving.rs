@@ -51,9 +51,9 @@ pub(super) struct Driving {
 /// A rule of the goal.
 #[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
 enum Rule {
-    /// It follows the target.
+    /// The goal follows the tracked target.
     Follows,
-    /// It stays where the designation put it.
+    /// The goal stays where the designation put it.
     Fixed,
 }
 

@@ -14,6 +14,7 @@ use sightline_api::endpoints::{BeginDrive, ShowDrive, ShowHazards, ShowSession, 
 use sightline_api::location::{AtDriveStop, AtSession};
 use sightline_api::wire::NewDrive;
 use sightline_recordings::DrivenTraverse;
+use sightline_rover::driving::DriveCommand;
 use sightline_session::driving::{DriveView, Steering};
 use sightline_session::faults;
 use sightline_session::hazard_view::HazardView;
@@ -128,16 +129,19 @@ fn add(
     let then = new.then.clone();
     let steering = Steering { target, run, command, then, pause_at: new.pause_at, pause: new.pause };
     let open = live.traverse();
-    let (saved, last, steering) = live.with(|session| {
+    let (saved, last, waiting) = live.with(|session| {
         let steps = &session.run(target, run).map_err(|error| ApiError::from(error).about_path())?.steps;
         // Refused before a world is made.
         let mut steered = session.clone();
         steered.steer(&open.traverse, steering.clone())?;
-        let steering = steered.steering.unwrap_or(steering);
-        Ok::<_, ApiError>((session.saved(), steps.last().map_or(0, |last| last.step), steering))
+        let waiting = steered.steering.map(|steered| steered.command.waiting).unwrap_or_default();
+        Ok::<_, ApiError>((session.saved(), steps.last().map_or(0, |last| last.step), waiting))
     })?;
     let designated = saved.targets[target].designation.step;
     let from_step = from_step(&open, new, designated, last)?;
+    // From an earlier stop, the goal is approached from the place of the designation.
+    let since = steering.command.since.filter(|since| *since <= from_step);
+    let steering = Steering { command: DriveCommand { waiting, since, ..steering.command }, ..steering };
     for (index, later) in new.then.iter().enumerate() {
         let designated = saved.targets[*later].designation.step;
         if designated > from_step {

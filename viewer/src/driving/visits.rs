@@ -31,7 +31,7 @@ pub(super) fn form(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             };
             let mut is_visited = place.is_some();
             let help = "The rover drives to it afterwards; the number is its place in the order. It is tracked meanwhile where it is in \
-                        view, and the mast looks at it again and again. A target that is lost or cannot be reached is dropped.";
+                        view, and the mast looks at it at intervals. A target that is lost or cannot be reached is dropped.";
             let shown = ui.checkbox(&mut is_visited, name).on_hover_text(help);
             if shown.accessible_name(format!("then visit {}", target.label)).changed() {
                 then.retain(|number| *number != target.number);
@@ -43,8 +43,9 @@ pub(super) fn form(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     });
     if !then.is_empty() {
         let mut command = state.driving.command.clone();
-        let help = "At a stop of its own, once the rover has moved by its longest step, as a part of the distance to that target, since \
-                    it was last in view. Otherwise a target that is out of view is carried by the pose estimate alone.";
+        let help = "The mast looks at a waiting target, at an extra stop, once the rover has moved by the longest step (as a part of the \
+                    distance to that target) since it was last in view. Otherwise a target that is out of view is carried by the pose \
+                    estimate alone.";
         let shown = ui.checkbox(&mut command.look_at_waiting, "look at the waiting targets");
         if shown.on_hover_text(help).changed() {
             out.push(Command::Drive(Ask::Form(command)));
@@ -55,7 +56,7 @@ pub(super) fn form(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     }
 }
 
-/// At what the mast looks after a decision without a motion.
+/// What the mast looks at after a decision without a motion.
 pub(super) fn look(state: &State, cycle: &Cycle) -> String {
     let targets = state.session.iter().flat_map(|session| &session.targets);
     let is_it = |designation| targets.into_iter().find(|target| target.designation == designation);

@@ -107,7 +107,7 @@ pub const HAZARD_CAMERAS_MAX: usize = 4;
 const ACTIONS_MAX: usize = 10;
 
 /// Most targets to which the rover drives afterwards.
-const WAITING_MAX: usize = 20;
+pub const WAITING_MAX: usize = 20;
 
 /// Most motions of a directed drive, and the longest of them, m.
 const MOTIONS_MAX: usize = 200;
@@ -133,7 +133,7 @@ pub struct DriveCommand {
     pub step_fraction: f64,
     /// The stops at which the target is looked for (`every`). Without odometry it has no effect.
     pub tracked_stops: TrackedStops,
-    /// Most stops, the first included (100; 2 to 1000).
+    /// Most stops, the first included, looks at waiting targets left out (100; 2 to 1000).
     pub stops_max: u32,
     /// What visual odometry is used for (`full`).
     pub odometry: OdometryMode,
@@ -166,7 +166,8 @@ pub struct DriveCommand {
     /// The drive has then ended with the last of them, and the target is tracked along.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub motions: Vec<Motion>,
-    /// The targets to which the rover drives afterwards; the server and the command line put them here from their list (none; 20 at most).
+    /// The targets to which the rover drives afterwards (none; 20 at most). The server and the command line put them here from their
+    /// list; those of a request are ignored.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub waiting: Vec<WaitingTarget>,
     /// Whether the mast also looks at a waiting target, at a stop of its own, once the rover has moved by `step_fraction` of the distance

@@ -9,8 +9,8 @@
 //! | 4 | `slip` | measured slip of the motion to this stop against `slip_max`, of what `slip_check` names |
 //! | 5 | `odometry_refused` | consecutive refused updates of visual odometry against `refusals_max` |
 //! | 6 | `tilt` | tilt against `tilt_max_deg` |
-//! | 7 | `time` | time on Mars against `flight_minutes_max` |
-//! | 8 | `stop_limit` | number of stops against `stops_max` |
+//! | 7 | `time` | time on Mars against `flight_minutes_max`; again with that of the hazard map (`executive.rs`) |
+//! | 8 | `stop_limit` | number of stops, looks at waiting targets left out, against `stops_max` |
 //! | 9 | `limit_cycle` | visits to this place (`limit_cycle.rs`); not in a directed drive |
 //!
 //! The remaining reasons follow from the selection of the path (`next_motion.rs`).
@@ -25,6 +25,7 @@ use super::command::{DriveCommand, GoalRule, SlipCheck};
 use super::executive::{Cycle, CycleInput};
 use super::limit_cycle;
 use super::next_motion::slip_to;
+use super::waiting;
 use crate::pipeline::Stops;
 
 /// Why a drive stopped.
@@ -159,7 +160,7 @@ pub(super) fn ending(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &Cycle) -
     if let Some(ending) = time_up(command, cycle.flight_minutes) {
         return Some(ending);
     }
-    let count = cycle.step + 1 - input.first.step;
+    let count = waiting::stops_beside_looks(stops, input.first, cycle.step);
     if count >= command.stops_max as usize {
         return end(StopReason::StopLimit, count as f64, f64::from(command.stops_max));
     }

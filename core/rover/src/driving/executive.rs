@@ -189,7 +189,7 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
     let target_in_site = target_in_site(input, stops);
     let (left, right) = stops.cameras(step);
     let mut time = FlightTime::of_stop([left.size, right.size], stops.measured_motion(step));
-    if input.last.why_not_searched().is_some() {
+    if input.last.is_odometry_alone() {
         time = time.without_tracking(input.command.odometry_pair);
     }
     let flight_minutes = input.before.map_or(0.0, |before| before.flight_minutes) + time.total_s() / 60.0;
@@ -217,7 +217,7 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
         ending: None,
     };
     if input.last.is_out_of_view() {
-        // The mast was pointed at another target: look at this one first, or before it at another one that waits.
+        // Look at a waiting target that is due, otherwise back at the present one.
         cycle.ending = ending(stops, input, &cycle);
         cycle.looks_at = looks_at(stops, input, &cycle);
         return cycle;
@@ -232,7 +232,8 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
     }
     cycle.ending = ending(stops, input, &cycle);
     cycle.looks_at = looks_at(stops, input, &cycle);
-    if cycle.ending.is_none() && cycle.looks_at.is_none() {
+    let looks_back = waiting::looked_at(stops, input.command, step).is_some();
+    if cycle.ending.is_none() && cycle.looks_at.is_none() && !looks_back {
         choose_motion(stops, input, &mut cycle, &target_in_site);
     }
     cycle

@@ -24,6 +24,7 @@ pub mod waiting;
 pub use active_world::{ActiveWorld, DriveReport, FollowedCycle, Stall};
 pub use command::{
     ArrivalAction, DriveCommand, GoalRule, HAZARD_CAMERAS_MAX, NavigatorKind, SlipCheck, TrackedStops,
+    WAITING_MAX,
 };
 pub use dead_reckoning::Reckoned;
 pub use ending::{Ending, StopReason};

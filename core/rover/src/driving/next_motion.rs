@@ -13,6 +13,7 @@ use crate::hazards::goodness::GoodnessMap;
 use crate::navigation::clear_way::{self, Obstacle};
 use crate::navigation::counterfactual::LimitChange;
 use crate::pipeline::Stops;
+use crate::sight::has_stayed;
 use crate::visual_odometry::OdometryMode;
 
 /// Longest step and largest turn that odometry follows, m and rad (driving.md 1: 75 cm, 18°).
@@ -53,7 +54,8 @@ pub(super) fn choose(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &mut Cycl
     match choice.motion() {
         Some(motion) => {
             // On a map the rover drives no farther than the path was judged.
-            let slip = slip_to(stops, cycle.step).filter(|_| map.is_none());
+            let moved = (1..=cycle.step).rev().find(|step| !has_stayed(stops, *step));
+            let slip = moved.and_then(|step| slip_to(stops, step)).filter(|_| map.is_none());
             let (motion, is_part) = followable(motion, input.command, slip);
             cycle.motion = Some(motion);
             cycle.odometry_alone = is_part && input.command.tracked_stops == TrackedStops::ByDistance;

@@ -148,6 +148,11 @@ fn look_back_from(world: &mut dyn ActiveWorld, step: usize) -> Result<()> {
     }
 }
 
+/// Whether the mast looked back from a stop, for the next motion.
+pub(super) fn has_looked_back(stops: &dyn Stops, step: usize) -> bool {
+    own_pair(stops, step).is_some_and(is_back)
+}
+
 /// Where the mast looked for the pair that vision took of its own at a stop.
 fn own_pair(stops: &dyn Stops, step: usize) -> Option<MastAngles> {
     let cameras = stops.further_cameras(step);

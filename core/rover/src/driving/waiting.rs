@@ -10,27 +10,30 @@
 //! | p_seen | its place at the last stop at which the pair was pointed at the target, or showed it |
 //! | t | the target as it was designated, site frame, m |
 //!
-//! It is the rule by which the target that the rover drives to is looked at. The place of the designation is good enough to point the mast;
-//! the tracker predicts by its own. A look is a stop of its own, and so is the look back at the other target.
+//! The motions to the present target have the same limit. The mast is pointed at the place of the designation; the tracker uses its own
+//! prediction. A look is a stop of its own, and so is the look back at the present target. Both are left out of the count that `stops_max`
+//! limits.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use sightline_geometry::frames::{Point3, Pose};
 use sightline_track::target::Designation;
+use sightline_track::trace::StepTrace;
 
 use super::command::DriveCommand;
-use crate::pair;
+use super::odometry::has_looked_back;
+use crate::pair::{self, StopPair};
 use crate::pipeline::Stops;
-use crate::sight::is_in_view;
+use crate::sight::{has_stayed, is_another_look, is_in_view};
 
 /// A target to which the rover drives afterwards.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WaitingTarget {
-    /// Its designation.
+    /// The designation of the target.
     pub designation: Designation,
-    /// Where that put it, site frame, m.
+    /// The position of the target at the designation, site frame, m.
     pub in_site_m: [f64; 3],
 }
 
@@ -42,16 +45,26 @@ impl WaitingTarget {
 
     /// Whether the pair was pointed at it at a stop, or showed it.
     fn is_seen(&self, stops: &dyn Stops, step: usize) -> bool {
-        if stops.is_odometry_alone(step) {
-            return false;
+        // A look at which the cameras gave no images is not repeated before the rover has moved on.
+        if stops.mast_target(step) == Some(self.designation) {
+            return true;
         }
-        let pair = pair::of_stop(stops, step, self.designation.camera);
-        let is_shown = |pair| is_in_view(&pair, &self.in_rover(&stops.site_from_rover(step)));
-        stops.mast_target(step) == Some(self.designation) || pair.is_ok_and(is_shown)
+        let has_images = !stops.is_odometry_alone(step) && !stops.has_dropped_out(step);
+        let pair = self.mast_pair(stops, step).filter(|_| has_images);
+        pair.is_some_and(|pair| is_in_view(&pair, &self.in_rover(&stops.site_from_rover(step))))
+    }
+
+    /// The pair of a stop in which it is tracked, if that is on the mast.
+    fn mast_pair<'a>(&self, stops: &'a dyn Stops, step: usize) -> Option<StopPair<'a>> {
+        let pair = pair::of_stop(stops, step, self.designation.camera).ok()?;
+        Some(pair).filter(|pair| pair.mast_angles.is_some())
     }
 
     /// Whether the rover has moved so far since it was last seen that it is to be looked at, at a stop.
     fn is_due(&self, stops: &dyn Stops, step: usize, step_fraction: f64) -> bool {
+        if self.mast_pair(stops, step).is_none() {
+            return false;
+        }
         let place = |step: usize| stops.site_from_rover(step).translation.vector;
         let here = place(step);
         let seen = (self.designation.step..=step).rev().find(|stop| self.is_seen(stops, *stop));
@@ -60,13 +73,14 @@ impl WaitingTarget {
     }
 }
 
-/// The waiting target that the mast looks at next from a stop; `None` if none is due, or without a mast.
+/// The waiting target that the mast looks at next from a stop; `None` if none is due, or without a mast. Where odometry was refused, and the
+/// mast looked back at the tracks for the next motion, none is.
 pub(super) fn due<'a>(
     stops: &dyn Stops,
     command: &'a DriveCommand,
     step: usize,
 ) -> Option<&'a WaitingTarget> {
-    stops.mast().filter(|_| command.look_at_waiting)?;
+    stops.mast().filter(|_| command.look_at_waiting && !has_looked_back(stops, step))?;
     command.waiting.iter().find(|target| target.is_due(stops, step, command.step_fraction))
 }
 
@@ -78,4 +92,11 @@ pub(super) fn looked_at<'a>(
 ) -> Option<&'a WaitingTarget> {
     let designation = stops.mast_target(step)?;
     command.waiting.iter().find(|target| target.designation == designation)
+}
+
+/// Number of stops since the designation, looks at another target and looks back left out.
+pub(super) fn stops_beside_looks(stops: &dyn Stops, first: &StepTrace, last: usize) -> usize {
+    let designation = first.update.target.designation;
+    let is_look = |step: &usize| has_stayed(stops, *step) && !is_another_look(stops, *step, designation);
+    last + 1 - first.step - (first.step + 1..=last).filter(is_look).count()
 }

@@ -35,7 +35,7 @@ pub enum HazardTerm {
     Tilt,
     /// RMS residual of the plane, m.
     Roughness,
-    /// Largest difference of the heights of two cells, m.
+    /// Largest difference of the heights of two cells above the slope of the ground, m.
     Step,
     /// Certainty below its limit; of a path the share of unknown cells.
     Unknown,

@@ -8,7 +8,7 @@
 //! | `points` | points of a stereo pair |
 //! | `grid`, `map`, `moments` | window that wraps around the rover; sums of a cell; plane fit |
 //! | `disc_sums`, `steps` | the disc of the rover's radius around every cell |
-//! | `slope` | the plane of the ground around every cell, above which steps are measured |
+//! | `slope` | the slope of the ground, above which steps are measured |
 //! | `goodness` | tilt, roughness, step, certainty, goodness; exemption and start |
 //!
 //! The map is inflated: the goodness of a cell is that of the whole disc around it, so that a path is judged by its centre line.

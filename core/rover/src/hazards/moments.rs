@@ -104,32 +104,19 @@ impl Moments {
 
     /// The plane through the points; `None` for points on a line, or fewer than three.
     pub(super) fn plane(&self) -> Option<Plane> {
-        let [n, sx, sy, sz, _, _, sxz, _, syz, szz, ..] = self.0;
-        let [a, b] = self.gradient()?;
-        let scatter = |product: f64, of: f64| product - of * sz / n;
-        let residual = (scatter(szz, sz) - a * scatter(sxz, sx) - b * scatter(syz, sy)).max(0.0);
-        Some(Plane { tilt_rad: a.hypot(b).atan(), roughness_m: (residual / n).sqrt() })
-    }
-
-    /// The height of that plane at a place, m; the mean height for points on a line, not finite without points.
-    pub(super) fn height_at(&self, [x, y]: [f64; 2]) -> f64 {
-        let [n, sx, sy, sz, ..] = self.0;
-        let [a, b] = self.gradient().unwrap_or([0.0; 2]);
-        sz / n + a * (x - sx / n) + b * (y - sy / n)
-    }
-
-    /// a and b of the plane; `None` for points on a line, or fewer than three.
-    fn gradient(&self) -> Option<[f64; 2]> {
-        let [n, sx, sy, sz, sxx, sxy, sxz, syy, syz, ..] = self.0;
+        let [n, sx, sy, sz, sxx, sxy, sxz, syy, syz, szz, ..] = self.0;
         let scatter = |product: f64, a: f64, b: f64| product - a * b / n;
         let (xx, xy, yy) = (scatter(sxx, sx, sx), scatter(sxy, sx, sy), scatter(syy, sy, sy));
-        let (xz, yz) = (scatter(sxz, sx, sz), scatter(syz, sy, sz));
+        let (xz, yz, zz) = (scatter(sxz, sx, sz), scatter(syz, sy, sz), scatter(szz, sz, sz));
         let (determinant, trace) = (xx * yy - xy * xy, xx + yy);
         // A comparison that is false for NaN as well.
         if !(trace > 0.0 && determinant > SCATTER_MIN * trace * trace) {
             return None;
         }
-        Some([(xz * yy - yz * xy) / determinant, (yz * xx - xz * xy) / determinant])
+        let a = (xz * yy - yz * xy) / determinant;
+        let b = (yz * xx - xz * xy) / determinant;
+        let residual = (zz - a * xz - b * yz).max(0.0);
+        Some(Plane { tilt_rad: a.hypot(b).atan(), roughness_m: (residual / n).sqrt() })
     }
 }
 

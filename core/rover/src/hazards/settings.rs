@@ -17,7 +17,7 @@ settings_group! {
         side_m: f64 = 16.0, "m", Domain::Between(4.0, 40.0), "ours; Goldberg02 has 10";
         /// Radius of the disc under which the ground is assessed: half the width over the wheels with a margin.
         rover_radius_m: f64 = 0.8, "m", Domain::Between(0.2, 2.0), "ours, after Goldberg02";
-        /// Distance of two cells up to which the difference of their heights is a step.
+        /// Distance of two cells up to which the difference of their heights above the slope of the ground is a step.
         step_reach_m: f64 = 0.4, "m", Domain::Between(0.1, 1.0), "ours, after Goldberg02";
         /// Tilt of the plane up to which it has full goodness.
         tilt_ok_deg: f64 = 8.0, "deg", Domain::Between(0.0, 45.0), "ours, after Goldberg02";

@@ -1,80 +1,60 @@
-//! The ground around every cell as a plane, from which the heights of steps are measured: the slope itself is not a step.
+//! The slope of the ground around the rover, above which steps are measured: the slope itself is not a step.
 //!
 //! ```text
-//! S(c) = z + a Δx + b Δy      least squares over the means of the known cells of a square around c, at the mean of c
+//! a = median (Δz − b Δy)/Δx   over pairs of cells `step_reach_m` apart along x
+//! b = median (Δz − a Δx)/Δy   over pairs of cells as far apart along y
 //! ```
-//! A rock at the border of the known ground tilts the plane. The fit is therefore repeated without the cells that are farther than
-//! `step_ok_m` from the first plane; the first one stays where less than half of them are left. The sums over a square are four values of sums over
-//! rectangles from the corner of the window [Crow84].
+//! Δx, Δy, Δz are the differences of the means of two known cells near the rover. Pairs at the edges of rocks and walls are fewer than
+//! the others and of both signs, so that they hardly move a median, and tops are as inclined as the ground beside them. Both
+//! medians are repeated, each with the other.
 //!
-//! Frame: heights z of the site from the reference of the map, m.
+//! Frame: axes of the site.
 
-use rayon::prelude::*;
-
-use super::moments::{Moments, SUMS};
 use super::settings::HazardSettings;
 
-/// Half the side of the square, m: several times the widest rock that a rover meets, and less than the hills.
-const HALF_SIDE_M: f64 = 2.0;
+/// Half the side of the square around the middle of the window whose cells are used, m: what the rover comes to in a few motions.
+const HALF_SIDE_M: f64 = 4.0;
+/// How often both medians are found: the means of cells are nearly on a lattice, on which they do not depend on each other.
+const REPEATED: usize = 3;
+/// Fewer pairs give no slope.
+const PAIRS_MIN: usize = 50;
 
-/// The height of the plane around every cell at the mean of its points, row by row, m, NaN where unknown; of cells on a line their
-/// mean height. `means_m` are those of the points of each cell, from the corner of the window.
-pub(super) fn slopes(means_m: &[Option<[f64; 3]>], side: usize, settings: &HazardSettings) -> Vec<f32> {
-    let half = (HALF_SIDE_M / settings.cell_m).round() as usize;
-    let first = planes(means_m, means_m, side, half);
-    let is_ground = |mean_m: &[f64; 3], plane_m: f64| (mean_m[2] - plane_m).abs() <= settings.step_ok_m;
-    let ground: Vec<Option<[f64; 3]>> = means_m
-        .iter()
-        .zip(&first)
-        .map(|(mean, plane)| mean.filter(|mean| is_ground(mean, plane.height_m)))
-        .collect();
-    let second = planes(means_m, &ground, side, half);
-    let best = |(first, second): (&Around, &Around)| {
-        let is_most = 2.0 * second.count >= first.count;
-        (if is_most { second.height_m } else { first.height_m }) as f32
-    };
-    first.iter().zip(&second).map(best).collect()
-}
-
-/// The plane of the ground around a cell.
-struct Around {
-    /// Its height at the mean of the cell, m; NaN without one.
-    height_m: f64,
-    /// Number of cells that it goes through.
-    count: f64,
-}
-
-/// The plane through the cells `of` around each cell `at`.
-fn planes(at: &[Option<[f64; 3]>], of: &[Option<[f64; 3]>], side: usize, half: usize) -> Vec<Around> {
-    let corner = corner_sums(of, side);
-    let width = side + 1;
-    let height = |(index, mean_m): (usize, &Option<[f64; 3]>)| {
-        let Some([x, y, _]) = *mean_m else { return Around { height_m: f64::NAN, count: 0.0 } };
-        let [[from_row, to_row], [from_column, to_column]] = [index / side, index % side]
-            .map(|number| [number.saturating_sub(half), (number + half + 1).min(side)]);
-        let at = |row: usize, column: usize| &corner[row * width + column].0;
-        let (all, above) = (at(to_row, to_column), at(from_row, to_column));
-        let (left, both) = (at(to_row, from_column), at(from_row, from_column));
-        let sums = Moments(std::array::from_fn(|k| all[k] - above[k] - left[k] + both[k]));
-        Around { height_m: sums.height_at([x, y]), count: sums.count() }
-    };
-    at.par_iter().enumerate().map(height).collect()
-}
-
-/// Sums over the known cells before each row and column.
-fn corner_sums(means_m: &[Option<[f64; 3]>], side: usize) -> Vec<Moments> {
-    let width = side + 1;
-    let mut sums = vec![Moments::default(); width * width];
-    for row in 0..side {
-        let mut of_row = Moments::default();
-        for column in 0..side {
-            if let Some(mean_m) = means_m[row * side + column] {
-                of_row.add(mean_m, 0.0, 0.0);
-            }
-            let above = sums[row * width + column + 1].0;
-            let sum: [f64; SUMS] = std::array::from_fn(|k| above[k] + of_row.0[k]);
-            sums[(row + 1) * width + column + 1] = Moments(sum);
+/// The slope of the ground along x and y, m/m, from the means of the points of each cell, m; 0 along an axis with few pairs of known
+/// cells.
+pub(super) fn slope(means_m: &[Option<[f64; 3]>], side: usize, settings: &HazardSettings) -> [f64; 2] {
+    let pairs = [0, 1].map(|axis| pairs(means_m, side, axis, settings));
+    let mut slope = [0.0; 2];
+    for _ in 0..REPEATED {
+        for axis in [0, 1] {
+            let other = 1 - axis;
+            let along = |change: &[f64; 3]| (change[2] - slope[other] * change[other]) / change[axis];
+            slope[axis] = median(pairs[axis].iter().map(along).collect());
         }
     }
-    sums
+    slope
+}
+
+/// The differences of the means of all pairs along an axis, m.
+fn pairs(means_m: &[Option<[f64; 3]>], side: usize, axis: usize, settings: &HazardSettings) -> Vec<[f64; 3]> {
+    let reach = ((settings.step_reach_m / settings.cell_m).round() as usize).max(1);
+    let half = ((HALF_SIDE_M / settings.cell_m).round() as usize).min(side / 2);
+    let near = side / 2 - half..side / 2 + half;
+    let cells = near.clone().flat_map(|row| near.clone().map(move |column| [row, column]));
+    let pair = |[row, column]: [usize; 2]| {
+        let next = if axis == 0 { [row + reach, column] } else { [row, column + reach] };
+        let mean = |[row, column]: [usize; 2]| means_m[row * side + column];
+        let is_inside = next.iter().all(|number| *number < side);
+        let [a, b] = [mean([row, column])?, is_inside.then(|| mean(next))??];
+        Some([b[0] - a[0], b[1] - a[1], b[2] - a[2]])
+    };
+    cells.filter_map(pair).collect()
+}
+
+/// The middle value; 0 of a few.
+fn median(mut values: Vec<f64>) -> f64 {
+    if values.len() < PAIRS_MIN {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! step(p) = max (|d(c) − d(c + o)| − k √(σ²(c) + σ²(c + o)))      c ∈ D_p ∩ (D_p − o),  0 < |o| ≤ reach
-//! d(c)    = h(c) − S(c)
+//! d(c)    = h(c) − a x(c) − b y(c)
 //! s²(c)   = Σz²/n − z̄² − σ²(c)
 //! edge(c) = max(z̄(c) − √3 s(c), z_top(c))
 //! h(c)    = edge(c) where s(c) > face_spread_m + 2 σ(c) and no cell beside c is as high within face_spread_m, else z̄(c)
@@ -12,7 +12,7 @@
 //! Where a cell beside it shows the top, the step to that cell is found anyway, and cells that are partly top and partly ground keep
 //! their mean.
 //!
-//! Without the slope, the uphill side of a rock would be lower than its height above the ground where it stands, by up to the fall of
+//! If the slope were not subtracted, the uphill side of a rock would be lower than its height above the ground where it stands, by up to the fall of
 //! the ground over `reach`, and its downhill side higher.
 //!
 //! For each offset o the differences form one image, and the maximum over the intersection of both discs is taken row by
@@ -20,7 +20,8 @@
 //!
 //! | symbol | meaning |
 //! |---|---|
-//! | S(c) | height of the plane of the ground around c, m (`slope.rs`) |
+//! | a, b | slope of the ground along x and y (`slope.rs`) |
+//! | x(c), y(c) | place of the mean of the points of cell c, m |
 //! | z̄(c), σ²(c) | mean height of the n points of cell c, m, and its expected variance, m² |
 //! | s(c) | spread of their heights beyond that error, m |
 //! | k | `step_sigmas` |
@@ -33,7 +34,7 @@ use rayon::prelude::*;
 use super::grid::Disc;
 use super::map::HazardMap;
 use super::settings::HazardSettings;
-use super::slope::slopes;
+use super::slope::slope;
 
 /// The largest step in the disc around every cell, row by row, m; 0 where no two cells are known.
 pub(super) fn steps(map: &HazardMap, disc: &Disc, reach: &Disc, settings: &HazardSettings) -> Vec<f32> {
@@ -60,7 +61,7 @@ pub(super) fn steps(map: &HazardMap, disc: &Disc, reach: &Disc, settings: &Hazar
     offsets.into_par_iter().map(|offset| largest(&cells, offset, disc)).reduce(nothing, larger)
 }
 
-/// The height of every cell above the plane of the ground around it, row by row, z down, m, NaN where unknown.
+/// The height of every cell beside the slope of the ground, row by row, z down, m, NaN where unknown.
 fn heights(map: &HazardMap, settings: &HazardSettings) -> Vec<f32> {
     let (side, cell_m) = (map.grid.side, map.grid.cell_m);
     let mean = |[row, column]: [usize; 2]| {
@@ -85,8 +86,12 @@ fn heights(map: &HazardMap, settings: &HazardSettings) -> Vec<f32> {
     };
     let cells = || (0..side * side).map(|index| [index / side, index % side]);
     let means_m: Vec<Option<[f64; 3]>> = cells().map(mean).collect();
-    let slopes = slopes(&means_m, side, settings);
-    cells().zip(slopes).map(|(at, slope)| height(at).map_or(f32::NAN, |m| m as f32 - slope)).collect()
+    let [a, b] = slope(&means_m, side, settings);
+    let above = |(at, mean): ([usize; 2], &Option<[f64; 3]>)| {
+        let [x, y, _] = (*mean)?;
+        Some((height(at)? - a * x - b * y) as f32)
+    };
+    cells().zip(&means_m).map(|cell| above(cell).unwrap_or(f32::NAN)).collect()
 }
 
 /// Replaces every value by the larger one of the two.
