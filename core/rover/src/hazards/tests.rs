@@ -172,6 +172,27 @@ fn mean_of(map: &HazardMap, cell: &[i64; 2]) -> Option<[f64; 3]> {
     (own.count() >= 1.0).then_some([corner[0] + x, corner[1] + y, z])
 }
 
+/// The slope of all pairs of cells that are four cells apart along an axis.
+fn slope_by_sorting(map: &HazardMap) -> [f64; 2] {
+    let side = map.grid.side as i64;
+    let mut slope = [0.0; 2];
+    for axis in [0, 1, 0, 1, 0, 1] {
+        let mut all = Vec::new();
+        for [row, column] in (0..side).flat_map(|row| (0..side).map(move |column| [row, column])) {
+            let next = [[row + 4, column], [row, column + 4]][axis];
+            if next[axis] < side
+                && let (Some(a), Some(b)) = (mean_of(map, &[row, column]), mean_of(map, &next))
+            {
+                let aside = slope[1 - axis] * (b[1 - axis] - a[1 - axis]);
+                all.push((b[2] - a[2] - aside) / (b[axis] - a[axis]));
+            }
+        }
+        all.sort_by(f64::total_cmp);
+        slope[axis] = all[all.len() / 2];
+    }
+    slope
+}
+
 #[test]
 fn sums_and_steps_are_those_of_a_visit_of_every_cell() {
     let settings =
@@ -188,24 +209,7 @@ fn sums_and_steps_are_those_of_a_visit_of_every_cell() {
     let assessed = assess(&map, &MapRules::default(), &settings);
     let grid = &map.grid;
     let side = grid.side as i64;
-    // The slope by sorting, of all pairs of cells that are four cells apart along an axis.
-    let mut slope = [0.0; 2];
-    for _ in 0..3 {
-        for axis in [0, 1] {
-            let mut all = Vec::new();
-            for (row, column) in (0..side).flat_map(|row| (0..side).map(move |column| (row, column))) {
-                let next = [[row + 4, column], [row, column + 4]][axis];
-                if next[axis] < side
-                    && let (Some(a), Some(b)) = (mean_of(&map, &[row, column]), mean_of(&map, &next))
-                {
-                    let aside = slope[1 - axis] * (b[1 - axis] - a[1 - axis]);
-                    all.push((b[2] - a[2] - aside) / (b[axis] - a[axis]));
-                }
-            }
-            all.sort_by(f64::total_cmp);
-            slope[axis] = all[all.len() / 2];
-        }
-    }
+    let slope = slope_by_sorting(&map);
     assert!(slope.iter().all(|along| along.abs() > 1e-4), "{slope:?}");
     let above = |cell: &[i64; 2]| mean_of(&map, cell).map(|[x, y, z]| z - slope[0] * x - slope[1] * y);
     for index in (0..grid.len()).step_by(7) {
