@@ -42,8 +42,10 @@ async fn a_removed_session_is_gone_for_good_unless_it_is_restored() {
     let path = format!("sessions/{session}");
     let mut events = server.state.events().subscribe();
     assert_eq!(delete(&server, &path).await, 204);
-    let told = serde_json::to_value(events.try_recv().unwrap()).unwrap();
-    assert_eq!(told, json!({ "event": "session_removed", "session": session }));
+    // On a busy machine events of the run may come after its end.
+    let mut told =
+        std::iter::from_fn(|| events.try_recv().ok()).map(|event| serde_json::to_value(event).unwrap());
+    assert!(told.any(|event| event == json!({ "event": "session_removed", "session": session })));
     server.get(&path).await.problem(404, "not_found");
     assert_eq!(delete(&server, &path).await, 404);
     assert_eq!(server.get("sessions").await.expect(200), json!([]));
