@@ -73,8 +73,8 @@ impl WaitingTarget {
     }
 }
 
-/// The waiting target that the mast looks at next from a stop; `None` if none is due, or without a mast. Where odometry was refused, and the
-/// mast looked back at the tracks for the next motion, none is.
+/// The waiting target that the mast looks at next from a stop; `None` if none is due, without a mast, and where the mast looked back
+/// at the tracks because odometry was refused.
 pub(super) fn due<'a>(
     stops: &dyn Stops,
     command: &'a DriveCommand,

@@ -5,8 +5,8 @@
 //! b = median (Δz − a Δx)/Δy   over pairs of cells as far apart along y
 //! ```
 //! Δx, Δy, Δz are the differences of the means of two known cells near the rover. Pairs at the edges of rocks and walls are fewer than
-//! the others and of both signs, so that they hardly move a median, and tops are as inclined as the ground beside them. Both
-//! medians are repeated, each with the other.
+//! the others and of both signs, so that they hardly move a median. The two medians are found in turn, each with the latest value of
+//! the other.
 //!
 //! Frame: axes of the site.
 
@@ -16,7 +16,7 @@ use super::settings::HazardSettings;
 const HALF_SIDE_M: f64 = 4.0;
 /// How often both medians are found: the means of cells are nearly on a lattice, on which they do not depend on each other.
 const REPEATED: usize = 3;
-/// Fewer pairs give no slope.
+/// Least number of pairs; fewer give no slope.
 const PAIRS_MIN: usize = 50;
 
 /// The slope of the ground along x and y, m/m, from the means of the points of each cell, m; 0 along an axis with few pairs of known
@@ -50,7 +50,7 @@ fn pairs(means_m: &[Option<[f64; 3]>], side: usize, axis: usize, settings: &Haza
     cells.filter_map(pair).collect()
 }
 
-/// The middle value; 0 of a few.
+/// The middle value; 0 for fewer than [`PAIRS_MIN`].
 fn median(mut values: Vec<f64>) -> f64 {
     if values.len() < PAIRS_MIN {
         return 0.0;

@@ -12,8 +12,8 @@
 //! Where a cell beside it shows the top, the step to that cell is found anyway, and cells that are partly top and partly ground keep
 //! their mean.
 //!
-//! If the slope were not subtracted, the uphill side of a rock would be lower than its height above the ground where it stands, by up to the fall of
-//! the ground over `reach`, and its downhill side higher.
+//! If the slope were not subtracted, a rock would be too low from its uphill side, by up to the fall of the ground over `reach`, and
+//! too high from its downhill side.
 //!
 //! For each offset o the differences form one image, and the maximum over the intersection of both discs is taken row by
 //! row: a run of l cells is covered by two runs of 2^k ≤ l, whose maxima are computed once for the whole image.
@@ -61,7 +61,7 @@ pub(super) fn steps(map: &HazardMap, disc: &Disc, reach: &Disc, settings: &Hazar
     offsets.into_par_iter().map(|offset| largest(&cells, offset, disc)).reduce(nothing, larger)
 }
 
-/// The height of every cell beside the slope of the ground, row by row, z down, m, NaN where unknown.
+/// The height of every cell without the slope of the ground, row by row, z down, m, NaN where unknown.
 fn heights(map: &HazardMap, settings: &HazardSettings) -> Vec<f32> {
     let (side, cell_m) = (map.grid.side, map.grid.cell_m);
     let mean = |[row, column]: [usize; 2]| {
