@@ -138,7 +138,7 @@ fn odometry_runs_alone_at_the_stops_between_two_steps() {
             if step.is_odometry_alone() {
                 left_m = length_m;
                 assert!(length_m < 0.75 / 0.9 && step.verdict().is_none() && step.capture().is_none());
-                assert!(cycle.flight.locate_s == 5.0 && step.row().reason.unwrap().contains("alone"));
+                assert!(cycle.flight.locate_s == 25.0 && step.row().reason.unwrap().contains("alone"));
             } else if left_m > 0.0 {
                 assert!((length_m / left_m - 1.0).abs() < 0.2, "{place}: {length_m} m after {left_m} m");
                 left_m = 0.0;

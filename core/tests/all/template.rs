@@ -202,6 +202,12 @@ fn a_match_far_from_the_prediction_must_score_more() {
         "{}",
         reason(&doubted)
     );
+    // The target lies far from the prediction, and nothing near it looks the same. With a large factor, and any score, that does not
+    // count.
+    let place = |steps: &[RunStep]| steps[2].located().and_then(|located| located.left_pixel).unwrap();
+    let biased = run(&world, &[("far_miss_factor", json!(1000.0)), ("far_ncc_min", json!(-1.0))]);
+    assert!(place(&biased).distance(place(&believed)) > 10.0, "{:?}", place(&biased));
+    assert!(believed[2].truth.as_ref().unwrap().err_px.unwrap() < 0.5);
     // Where the prediction is right, the criterion is not asked.
     assert_eq!(doubted[1].update.state, TrackingState::Tracking);
 }
@@ -217,6 +223,18 @@ fn a_pick_whose_stereo_match_is_below_its_limit_is_warned_of() {
     };
     assert!(!kinds(0.7).contains(&WarningKind::WeakStereo));
     assert!(kinds(1.0).contains(&WarningKind::WeakStereo));
+}
+
+#[test]
+fn a_pick_whose_stereo_match_does_not_lead_back_is_warned_of() {
+    use sightline_track::locate::template::warnings::WarningKind;
+    let warnings = |limit: f64| {
+        let steps = run(&turned_plane(), &[("warn_left_right_px", json!(limit))]);
+        steps[0].template().unwrap().warnings.clone()
+    };
+    assert!(!warnings(1.5).iter().any(|warning| warning.kind == WarningKind::LeftRight));
+    let found = warnings(0.0).into_iter().find(|warning| warning.kind == WarningKind::LeftRight).unwrap();
+    assert!(found.value > 0.0 && found.value < 1.0 && found.sentence.contains("px away"), "{found:?}");
 }
 
 #[test]

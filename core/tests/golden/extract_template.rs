@@ -34,6 +34,7 @@ fn warning(sheet: &mut Sheet, warning: &Warning) {
         WarningKind::OccludingBoundary => "occluding boundary",
         WarningKind::Shadow => "shadow",
         WarningKind::WeakStereo => "weak stereo",
+        WarningKind::LeftRight => "left-right",
     };
     sheet.put("kind", kind);
     sheet.put("value", warning.value);

@@ -247,6 +247,8 @@ settings_group! {
         warn_depth_range: f64 = 0.1, "", Domain::Between(0.0, 10.0), "ours";
         /// Warns at designation if the window's standard deviation is below this fraction of full scale.
         warn_contrast: f64 = 0.01, "", Domain::Between(0.0, 1.0), "ours";
+        /// Warns at designation if the stereo match leads back to a left pixel farther away than this.
+        warn_left_right_px: f64 = 1.5, "px", Domain::Between(0.0, 100.0), "ours";
         /// Warns at designation if a larger fraction of the window is in shadow; needs a known sun direction.
         warn_shadow_share: f64 = 0.2, "", Domain::Between(0.0, 1.0), "ours";
         /// Warns at designation of an occluding boundary: the ranges in the window deviate from a plane by more than this

@@ -21,8 +21,13 @@ pub struct Preset {
 }
 
 /// What the paper leaves out and the defaults switch on (K§4.3, K§4.4).
-pub const AS_PUBLISHED: [&str; 4] =
-    ["surface_warp=false", "focus_px=0", "template_update=every_update", "far_ncc_min=-1"];
+pub const AS_PUBLISHED: [&str; 5] = [
+    "surface_warp=false",
+    "focus_px=0",
+    "template_update=every_update",
+    "far_ncc_min=-1",
+    "far_miss_factor=1",
+];
 
 const fn published(
     name: &'static str,

@@ -4,10 +4,13 @@
 //! |---|---|---|
 //! | point_mast | 5 s | ours |
 //! | capture | 30 s for a 12-bit 1024 × 1024 pair, less with fewer pixels, 5 s at least | R148 |
-//! | locate | 5 s: correlation 4 s, point stereo 1 s | R147 |
+//! | locate | 25 s: correlation 4 s, point stereo 1 s, 20 s of other tasks of the processor | R147, R149 |
 //! | visual odometry | 90 s for each update, and point_mast and capture for a pair of its own | R149 |
 //! | select_path | 300 s with a hazard map: its pair, the map and the path | R149 |
 //! | drive | 3.75 cm/s, 2.1°/s | domain.md 5.4 |
+//!
+//! The other tasks take what is missing to the first line of Table IV: two updates without a motion in two minutes (R143). The other lines
+//! and the 19 min of checkout 2 then test the model.
 //!
 //! Unit: s.
 
@@ -26,6 +29,8 @@ const CAPTURE_PX: f64 = 2.0 * 1024.0 * 1024.0;
 const CAPTURE_MIN_S: f64 = 5.0;
 /// Turning the mast, s.
 const POINT_MAST_S: f64 = 5.0;
+/// Finding the target with the other tasks that run meanwhile, s.
+const LOCATE_S: f64 = 25.0;
 /// One update of the navigator: pair, hazard map and path, s.
 const HAZARDS_S: f64 = 300.0;
 /// One update of visual odometry, s.
@@ -45,7 +50,7 @@ pub struct FlightTime {
     pub point_mast_s: f64,
     /// Exposing and transferring the pair.
     pub capture_s: f64,
-    /// Finding the target.
+    /// Finding the target, with the other tasks of the processor.
     pub locate_s: f64,
     /// Pair, hazard map and path; 0 without a hazard map.
     #[serde(default, skip_serializing_if = "is_zero")]
@@ -87,7 +92,7 @@ impl FlightTime {
             odometry_s,
             point_mast_s: POINT_MAST_S,
             capture_s,
-            locate_s: 5.0,
+            locate_s: LOCATE_S,
             hazards_s: 0.0,
             drive_s: 0.0,
         }
@@ -134,10 +139,11 @@ mod tests {
 
     #[test]
     fn an_update_takes_half_a_minute_to_a_minute_as_in_flight() {
-        // R149: one update 0.5 to 1 min with full pairs; small pairs are several seconds faster.
+        // R149: one update 0.5 to 1 min; R148: a small pair is transferred in several seconds instead of 30.
         let full = FlightTime::of_stop([[1024, 1024]; 2], None).total_s();
-        assert!((30.0..60.0).contains(&full), "{full}");
-        assert!(FlightTime::of_stop([[256, 256]; 2], None).total_s() < 0.5 * full);
+        assert!((30.0..=60.0).contains(&full), "{full}");
+        let small = FlightTime::of_stop([[256, 256]; 2], None).total_s();
+        assert!((30.0..=full - 20.0).contains(&small), "{small}");
         // R149: 1.5 to 2 min for an update of visual odometry.
         for (camera, expected_s) in [(None, 90.0), (Some(CameraName::ODOMETRY), 125.0)] {
             let measured = MeasuredMotion { camera, ..crate::visual_odometry::accepted() };

@@ -12,10 +12,11 @@ use sightline_track::settings::Settings;
 use sightline_track::target::TrackingState;
 
 /// What never has a say.
-const NEVER: [&str; 23] = [
+const NEVER: [&str; 24] = [
     "tracker",
     "warn_depth_range",
     "warn_contrast",
+    "warn_left_right_px",
     "warn_shadow_share",
     "warn_boundary",
     "n_retry",

@@ -8,7 +8,8 @@
 //! * `transform = search`: for each of them every pair of a scale and a roll from a grid, without the geometry (R224).
 //!   Scales are spaced by a ratio and rolls by a step, both about none.
 //!
-//! Each is matched by the first stage, and the highest score of the measure wins, the first among equals. Of matches at the
+//! Each is matched by the first stage, and the highest score of the measure wins, the first among equals, a match near the
+//! prediction before one far from it that scores little more (`near`). Of matches at the
 //! same place the one with the higher score in focus wins, where there is a focus: it counts the surroundings of the target
 //! most. A match against an older appearance starts from that appearance's drift.
 
@@ -16,6 +17,7 @@ use super::failure::TemplateFailure;
 use super::first_match::FirstMatch;
 use super::match_template::{TriedTemplate, first_match, focused_score};
 use super::memory::{Appearance, Kept, TemplateMemory};
+use super::near;
 use super::scale_roll::{Preparation, Prepared, ScaleRoll, scale_roll};
 use super::settings::{TemplateSettings, Transform};
 use crate::locate::tracker::LocateInput;
@@ -106,7 +108,7 @@ pub(super) fn choose<'a>(
                 let is_same_place = first.peak.pixel.distance(best.first.peak.pixel) <= SAME_PLACE_PX;
                 match (focused, its_focused) {
                     (Some(focused), Some(its_focused)) if is_same_place => focused > *its_focused,
-                    _ => first.peak.score > best.first.peak.score,
+                    _ => near::is_better(&first, &best.first, input),
                 }
             };
             if best.as_ref().is_none_or(is_better) {
@@ -137,7 +139,10 @@ fn attempt<'a>(
     let prepared = scale_roll(appearance, now_from_template, left, settings, preparation)
         .map_err(|missing| Unmatched { scale_roll: None, missing })?;
     match first_match(&prepared, input, settings) {
-        Ok(first) => Ok((prepared, first)),
+        Ok(mut first) => {
+            near::prefer_near(&mut first, input);
+            Ok((prepared, first))
+        }
         Err(missing) => Err(Unmatched { scale_roll: Some(Box::new(prepared.record)), missing }),
     }
 }

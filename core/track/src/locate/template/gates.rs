@@ -13,17 +13,14 @@
 //!
 //! Gates 5 to 8 exist only where their limit switches them on.
 //!
-//! A match far from the prediction was found in a larger area, in which a wrong one is likelier: beyond `far_sigma`
-//! standard deviations of `ν = pixel − predicted`, that is `νᵀ (Σ_pred + Σ_match)⁻¹ ν > far_sigma²`, it must score more.
-
-use nalgebra::Vector2;
+//! A match far from the prediction (`near`) was found in a larger area, in which a wrong one is likelier: it must score more.
 
 use super::evidence::TemplateEvidence;
 use super::match_template::TemplateMatch;
+use super::near::is_far;
 use crate::gate::{DISTANCE_CORRECTION, Gate, GateKind, POSITION_CORRECTION, Side, Unit};
 use crate::limits::Limits;
 use crate::locate::tracker::GateInput;
-use crate::stages::point_mast::Pointing;
 
 const NCC: GateKind = GateKind {
     number: 1,
@@ -108,23 +105,13 @@ pub(super) fn gates(evidence: &TemplateEvidence, input: &GateInput<'_>) -> Vec<G
     if limits.left_right_max_px > 0.0 {
         gates.push(LEFT_RIGHT.judge(stereo.and_then(|s| s.left_right_px), limits.left_right_max_px));
     }
-    let is_far = || matched.is_some_and(|matched| is_far(input.pointing, matched, limits.far_sigma));
+    let is_far =
+        || matched.is_some_and(|m| is_far(input.pointing, m.pixel, &m.covariance_px2, limits.far_sigma));
     if limits.far_ncc_min > -1.0 && is_far() {
         gates.push(FAR_NCC.judge(ncc, limits.far_ncc_min));
     }
     gates.extend(peak_gates(matched, limits));
     gates
-}
-
-/// Whether the match is farther than `sigmas` standard deviations from the prediction.
-fn is_far(pointing: &Pointing, matched: &TemplateMatch, sigmas: f64) -> bool {
-    let (Some(predicted), Some(covariance)) = (pointing.predicted_left, pointing.predicted_covariance_px2)
-    else {
-        return false;
-    };
-    let innovation = Vector2::new(matched.pixel.x - predicted.x, matched.pixel.y - predicted.y);
-    let inverse = (covariance + matched.covariance_px2).try_inverse();
-    inverse.is_some_and(|inverse| innovation.dot(&(inverse * innovation)) > sigmas * sigmas)
 }
 
 /// The gates of the peak that are switched on.

@@ -69,7 +69,7 @@ pub struct TemplateMatch {
     pub flat_positions: u32,
     /// The measure by which `surface`, `peak` and `second_peak` score.
     pub measure: Measure,
-    /// The best match of the whole window by the measure.
+    /// The best match of the whole window by the measure, or the best near the prediction (`near`).
     pub peak: Peak,
     /// Where the target is: the best match in focus or of the second stage, or `peak` where there is neither, px.
     pub pixel: Pixel,
@@ -77,7 +77,7 @@ pub struct TemplateMatch {
     pub score: f64,
     /// The score in focus at `pixel`; null where the peak of the whole window stands.
     pub focused_score: Option<f64>,
-    /// The next best, at least half a template away.
+    /// The next best, at least half a template away; its ratio is above 1 where a better match far from the prediction was given up.
     pub second_peak: Option<SecondPeak>,
     /// What the coarse-to-fine search saw; null for an exhaustive one.
     pub coarse: Option<CoarseSearch>,

@@ -18,6 +18,7 @@ mod window_map;
 pub mod scale_roll;
 mod choose;
 pub mod match_template;
+mod near;
 pub mod klt;
 pub mod affine;
 pub mod drift_correction;
@@ -196,7 +197,7 @@ fn designate(input: &DesignateInput<'_>) -> Sighting<TemplateEvidence> {
     let mut found = finish(TemplateEvidence::default(), &stereo, Drift::of_pixel(covariance), settings);
     let evidence = &mut found.evidence;
     if let (Some(position), Some(matched)) = (&evidence.triangulate, &evidence.point_stereo) {
-        evidence.warnings = warnings::look(&stereo, position.range_m, matched.score, input.settings);
+        evidence.warnings = warnings::look(&stereo, position.range_m, matched, input.settings);
     }
     found
 }

@@ -6,6 +6,7 @@
 //! | `depth_range` | (farthest − nearest) / distance in the window | ≤ `warn_depth_range` |
 //! | `occluding_boundary` | largest departure from a plane / distance | ≤ `warn_boundary` |
 //! | `weak_stereo` | score of point stereo | ≥ `stereo_ncc_min` |
+//! | `left_right` | way from the left pixel to the right one and back | ≤ `warn_left_right_px` |
 //! | `shadow` | share of the window in shadow, where the simulator knows the light | ≤ `warn_shadow_share` |
 //!
 //! Ranges are those of the target and of eight neighbours in the window (`relief`). Where fewer than five remain nothing is
@@ -26,7 +27,7 @@ use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::point_stereo::StereoInput;
+use super::point_stereo::{PointStereo, StereoInput};
 use super::relief;
 use super::settings::TemplateSettings;
 use crate::limits::Limits;
@@ -50,6 +51,8 @@ pub enum WarningKind {
     Shadow,
     /// Point stereo found nothing alike, so that the range may be any.
     WeakStereo,
+    /// The match of point stereo does not lead back to the pixel, so that the range may be any.
+    LeftRight,
 }
 
 /// One warning.
@@ -57,7 +60,7 @@ pub enum WarningKind {
 pub struct Warning {
     /// What is wrong.
     pub kind: WarningKind,
-    /// What was measured, as a share.
+    /// What was measured, px for `left_right`, otherwise a share.
     pub value: f64,
     /// The limit it exceeds, or falls below.
     pub limit: f64,
@@ -65,25 +68,17 @@ pub struct Warning {
     pub sentence: String,
 }
 
-/// Looks at the window of a designated target at `range_m`, which a stereo match of that score gave.
+/// Looks at the window of a designated target at `range_m`, which this stereo match gave.
 pub(super) fn look(
     input: &StereoInput<'_>,
     range_m: f64,
-    stereo_score: f64,
+    stereo: &PointStereo,
     settings: &Settings,
 ) -> Vec<Warning> {
     let (limits, template) = (&settings.limits, &settings.template);
     let window =
         patch::extract(input.left_image, input.left_pixel, template.template_size_px / 2, template.kernel);
-    let mut found = Vec::new();
-    if stereo_score < limits.stereo_ncc_min {
-        found.push(Warning {
-            kind: WarningKind::WeakStereo,
-            value: stereo_score,
-            limit: limits.stereo_ncc_min,
-            sentence: format!("weak stereo match: score {stereo_score:.2}, so that the range may be wrong"),
-        });
-    }
+    let mut found = of_stereo(stereo, limits);
     if let Some(contrast) = window.std().filter(|std| *std < limits.warn_contrast) {
         let sentence = format!(
             "the window has little texture: its standard deviation is {:.2} % of full scale",
@@ -100,6 +95,31 @@ pub(super) fn look(
     if ranges.len() >= POINTS_MIN {
         let half_px = f64::from(template.template_size_px / 2);
         found.extend(of_ranges(&ranges, range_m, half_px, limits));
+    }
+    found
+}
+
+/// The warnings for a stereo match.
+fn of_stereo(stereo: &PointStereo, limits: &Limits) -> Vec<Warning> {
+    let mut found = Vec::new();
+    let score = stereo.score;
+    if score < limits.stereo_ncc_min {
+        found.push(Warning {
+            kind: WarningKind::WeakStereo,
+            value: score,
+            limit: limits.stereo_ncc_min,
+            sentence: format!("weak stereo match: score {score:.2}, so that the range may be wrong"),
+        });
+    }
+    if let Some(value) = stereo.left_right_px.filter(|apart_px| *apart_px > limits.warn_left_right_px) {
+        found.push(Warning {
+            kind: WarningKind::LeftRight,
+            value,
+            limit: limits.warn_left_right_px,
+            sentence: format!(
+                "the stereo match leads back to a pixel {value:.1} px away, so that the range may be wrong"
+            ),
+        });
     }
     found
 }
