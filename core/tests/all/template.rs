@@ -202,12 +202,19 @@ fn a_match_far_from_the_prediction_must_score_more() {
         "{}",
         reason(&doubted)
     );
-    // The target lies far from the prediction, and nothing near it looks the same. With a large factor, and any score, that does not
-    // count.
-    let place = |steps: &[RunStep]| steps[2].located().and_then(|located| located.left_pixel).unwrap();
-    let biased = run(&world, &[("far_miss_factor", json!(1000.0)), ("far_ncc_min", json!(-1.0))]);
-    assert!(place(&biased).distance(place(&believed)) > 10.0, "{:?}", place(&biased));
-    assert!(believed[2].truth.as_ref().unwrap().err_px.unwrap() < 0.5);
+    // Nothing near the prediction looks like the target. A large factor takes what is there.
+    let matched = |factor: f64| {
+        let changes = [
+            ("far_miss_factor", json!(factor)),
+            ("far_ncc_min", json!(-1.0)),
+            ("far_sigma", json!(6.0)),
+            ("scale", json!(false)),
+        ];
+        run(&world, &changes)[2].template().unwrap().match_template.clone().unwrap()
+    };
+    let (far, near) = (matched(2.0), matched(1000.0));
+    assert!(far.pixel.distance(near.pixel) > 10.0, "{:?} {:?}", far.pixel, near.pixel);
+    assert!(far.second_peak.unwrap().ratio < 1.0 && near.second_peak.unwrap().ratio > 1.0);
     // Where the prediction is right, the criterion is not asked.
     assert_eq!(doubted[1].update.state, TrackingState::Tracking);
 }

@@ -236,7 +236,7 @@ settings_group! {
         far_ncc_min: f64 = 0.85, "", Domain::Between(-1.0, 1.0), "ours; docs/tracking.md";
         /// Distance from the prediction beyond which a match is far, in standard deviations of prediction and match
         /// combined.
-        far_sigma: f64 = 3.0, "", Domain::Between(0.0, 1000.0), "ours; docs/tracking.md", unless far_ncc_min = -1.0;
+        far_sigma: f64 = 3.0, "", Domain::Between(0.0, 1000.0), "ours; docs/tracking.md", unless far_ncc_min = -1.0, unless far_miss_factor = 1.0;
         /// Largest ratio of the second peak to the best one; near 1 the match is ambiguous. 1: off.
         second_peak_ratio_max: f64 = 1.0, "", Domain::Between(0.0, 1.0), "ours; off";
         /// Largest 1σ error of a match along its worst direction; 0: off.

@@ -26,9 +26,6 @@ use crate::stages::point_mast::Pointing;
 use sightline_geometry::frames::Pixel;
 use sightline_vision::correlate::peak::{self, Peak};
 
-/// How many maxima are looked at.
-const MAXIMA: usize = 100;
-
 /// Whether a match with this covariance is farther than `sigmas` standard deviations from the prediction; no if that is unknown.
 pub(super) fn is_far(pointing: &Pointing, pixel: Pixel, covariance_px2: &Matrix2<f64>, sigmas: f64) -> bool {
     let (Some(predicted), Some(covariance)) = (pointing.predicted_left, pointing.predicted_covariance_px2)
@@ -68,7 +65,7 @@ pub(super) fn prefer_near(first: &mut FirstMatch, input: &LocateInput<'_>) {
         return;
     }
     let surface = &first.surface;
-    let mut peaks = peak::highest_maxima(surface, MAXIMA).into_iter().filter_map(|([x, y], _)| {
+    let mut peaks = peak::highest_maxima(surface, usize::MAX).into_iter().filter_map(|([x, y], _)| {
         let (ix, iy) = surface.index_of(x, y)?;
         peak::peak_at(surface, ix, iy, input.settings.template.sub_pixel)
     });

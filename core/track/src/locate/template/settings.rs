@@ -86,7 +86,7 @@ settings_group! {
         /// Height term: difference of relief at which the term is zero.
         height_scale_m: f64 = 0.05, "m", Domain::Between(0.001, 10.0), "ours", unless height_weight = 0.0;
         /// Factor on 1 − score of a match far from the prediction (see far_sigma) where it is compared with one near it; 1: off.
-        far_miss_factor: f64 = 2.0, "", Domain::Between(1.0, 1000.0), "ours; docs/tracking.md";
+        far_miss_factor: f64 = 2.0, "", Domain::Between(1.0, 1000.0), "ours; docs/tracking.md", if measure = "ncc";
         /// Number of templates that are matched: the current one and those it replaced, newest first; the best score wins.
         reference_templates: u32 = 1, "", Domain::Between(1.0, 20.0), "ours";
         /// 1σ of the Gaussian window with which a match is refined; 0: uniform weights, as in the paper.
