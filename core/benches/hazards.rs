@@ -185,5 +185,5 @@ fn counterfactual_of_a_blocked_rover(bencher: Bencher<'_, '_>) {
 }
 
 fn input<'a>(map: &'a GoodnessMap, pose: &'a Pose) -> PathInput<'a> {
-    PathInput { goal_m: [6.0, 1.0], step_m: 0.6, curvature_per_m: 0.0, map: Some(map), site_from_rover: pose }
+    PathInput { goal_m: [6.0, 1.0], step_m: 0.6, before: None, map: Some(map), site_from_rover: pose }
 }

@@ -118,7 +118,7 @@ impl Rover<'_> {
     fn drive(&self, first: DrivenStop) -> Result<Drive> {
         let settings = self.of.hazards;
         let navigator = HazardNavigator { settings: self.of.navigator.clone() };
-        let (mut stop, mut map, mut curvature_per_m) = (first, None, 0.0);
+        let (mut stop, mut map, mut before) = (first, None, None);
         let start = stop.true_site_from_rover.to_pose().translation.vector;
         let mut drive = Drive::default();
         loop {
@@ -148,7 +148,7 @@ impl Rover<'_> {
             let input = PathInput {
                 goal_m: [goal.x, goal.y],
                 step_m: self.of.command.step_fraction * (drive.left_m + self.of.command.standoff_m),
-                curvature_per_m,
+                before,
                 map: Some(&goodness),
                 site_from_rover: &pose,
             };
@@ -158,7 +158,10 @@ impl Rover<'_> {
                 return Ok(Drive { end, ..drive });
             };
             let (motion_m, turn_rad) = followed(&motion);
-            curvature_per_m = if motion_m == 0.0 { 0.0 } else { turn_rad / motion_m };
+            before = Some(match motion {
+                Motion::Turn { .. } => Motion::Turn { angle_rad: turn_rad },
+                Motion::Arc { curvature_per_m, .. } => Motion::Arc { length_m: motion_m, curvature_per_m },
+            });
             stop =
                 stop.next(self.world, self.scenario, drive.stops, [motion_m, turn_rad], Cancel::default())?;
             drive.driven_m += motion_m.abs() * stop.completed;

@@ -46,7 +46,7 @@ pub(super) fn choose(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &mut Cycl
     let path_input = PathInput {
         goal_m: cycle.goal.in_rover_m,
         step_m: step_m(input, distance_m),
-        curvature_per_m: input.before.and_then(|before| before.motion).map_or(0.0, |m| m.curvature_per_m()),
+        before: input.before.and_then(|before| before.motion),
         map,
         site_from_rover,
     };

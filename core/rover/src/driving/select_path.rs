@@ -29,8 +29,8 @@ pub struct PathInput<'a> {
     pub goal_m: [f64; 2],
     /// Largest length of the motion, m.
     pub step_m: f64,
-    /// Curvature of the motion before, 1/m, positive to the right; 0 at the first stop and after a turn.
-    pub curvature_per_m: f64,
+    /// The motion that led here; `None` at the first stop and where the rover stayed.
+    pub before: Option<Motion>,
     /// The goodness map of this stop; `None` without range data.
     pub map: Option<&'a GoodnessMap>,
     /// The pose estimate.

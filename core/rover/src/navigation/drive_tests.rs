@@ -50,7 +50,7 @@ impl Drive<'_> {
         let mut stance = pose([0.0, 0.0], 0.0);
         let mut map: Option<HazardMap> = None;
         let mut driven = Driven { arrived: false, stops: 0, driven_m: 0.0, clearance_m: f64::INFINITY };
-        let mut curvature_per_m = 0.0;
+        let mut before = None;
         while driven.stops < 120 {
             driven.stops += 1;
             let origin = [stance.translation.x, stance.translation.y];
@@ -73,15 +73,15 @@ impl Drive<'_> {
             let input = PathInput {
                 goal_m: [goal.x, goal.y],
                 step_m: 0.6_f64.min(0.3 + 0.1 * distance_m),
-                curvature_per_m,
+                before,
                 map: Some(&goodness),
                 site_from_rover: &stance,
             };
             let choice = HazardNavigator { settings: self.preset.settings() }.select_path(&input);
             let Some(motion) = choice.motion() else { break };
-            if let Motion::Arc { length_m, curvature_per_m: curvature } = motion {
+            before = Some(motion);
+            if let Motion::Arc { length_m, .. } = motion {
                 driven.driven_m += length_m.abs();
-                curvature_per_m = curvature;
             }
             let errors = self.error.map(|error| error * random.random_range(-1.0..1.0));
             let start = stance;

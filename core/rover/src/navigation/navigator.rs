@@ -7,6 +7,8 @@
 //!              if that turn is vetoed: an arc backwards to that point
 //!              if none passes: a turn to either side, the least multiple of `turn_deg` after which an arc passes
 //!              if none passes: straight back by `back_up_m`
+//!              if none passes: the motion before, backwards, if it was an arc ahead; it has no veto. Where the rover would stay
+//!              because it can reach no nearer place, only if a way from there leads nearer to the goal
 //! goal         exp(−(Δψ/goal_width)²)     Δψ: heading at the end of the path against the way from there
 //! steer        1 − |κ − κ_now|/(2 κ_max);  0 of a turn
 //! vote         w_h · hazard + w_g · goal + w_s · steer
@@ -17,11 +19,14 @@
 //! | κ, κ_now | curvature of the path, and of the motion before | 1/m |
 //! | κ_max | `curvature_max_per_m` | 1/m |
 //!
+//! The wheels have been on the ground of the motion before, whatever the map says of it now. This happens where a rock looks higher from
+//! near than it did from afar, and straight back lies unseen ground.
+//!
 //! Without a way the candidates follow the route (`route.rs`), and without a route the straight line. A turn after which no arc passes has
 //! the veto of the arc that gets farthest: a rover in a closed pocket has no safe path, instead of turning for ever.
 //!
 //! Departures from domain.md 8.2: way and route, the arc or turn to them, paths that lead away from them only without another, the
-//! leading disc, turns that lead to an arc, backing up, and the lower quality of ground near bad cells. Without a map the choice
+//! leading disc, turns that lead to an arc, both kinds of backing up, and the lower quality of ground near bad cells. Without a map the choice
 //! is that of [`ArcNavigator`].
 //!
 //! Frame: site, horizontal. Source: domain.md 8.2; papers.md R9.
@@ -46,6 +51,8 @@ use super::way::Way;
 const AT_END_M: f64 = 0.02;
 /// A path of less agreement with the way leads away from it.
 const GOAL_MIN: f64 = 0.1;
+/// A way leads nearer to the goal if it ends by so much nearer, m.
+const NEARER_M: f64 = 0.3;
 /// Stances from which a way is searched, before the goal is examined for being enclosed.
 const STANCES_MAX: usize = 6000;
 /// A pocket that encloses a goal has fewer stances.
@@ -98,12 +105,15 @@ impl HazardNavigator {
             decision.aim_m = goal_m;
         }
         let mut candidates = decision.candidates();
-        let chosen = match manoeuvre {
-            _ if stays => None,
-            Some(manoeuvre) => {
-                candidates.push(manoeuvre);
+        let way_back =
+            || decision.way_back().filter(|back| !stays || decision.leads_nearer(&back.motion, goal_m));
+        let before_others = manoeuvre.or_else(|| is_blocked(&candidates).then(way_back).flatten());
+        let chosen = match before_others {
+            Some(motion) => {
+                candidates.push(motion);
                 Some(candidates.len() - 1)
             }
+            None if stays => None,
             None => best(&candidates),
         };
         PathChoice { chosen, candidates, route_m, blocked_goal }
@@ -182,6 +192,27 @@ impl<'a> Decision<'a> {
             candidates.push(self.judge(&back));
         }
         candidates
+    }
+
+    /// The motion before, backwards. One that led backwards is not undone: the rover would go to and fro.
+    fn way_back(&self) -> Option<Candidate> {
+        match self.input.before? {
+            Motion::Arc { length_m, curvature_per_m } if length_m > 0.0 => {
+                let back = Motion::Arc { length_m: -length_m, curvature_per_m };
+                Some(Candidate { veto: None, ..self.judge(&back) })
+            }
+            Motion::Arc { .. } | Motion::Turn { .. } => None,
+        }
+    }
+
+    /// Whether a way leads nearer to the goal from the end of a motion than the rover is.
+    fn leads_nearer(&self, motion: &Motion, goal_m: [f64; 2]) -> bool {
+        let moves = Moves::new(self.ground, self.settings);
+        let start = self.start.after(motion, 1.0);
+        let mut there = Decision { start, aim_m: goal_m, route: None, way: None, ..*self };
+        there.find_way(&moves, Aim::of(&moves, start, goal_m));
+        let end_m = there.way.as_ref().map(Way::end);
+        end_m.is_some_and(|end_m| distance_m(end_m, goal_m) + NEARER_M < distance_m(self.start.at_m, goal_m))
     }
 
     /// The motion with which the way begins, where that is a manoeuvre without a veto.
@@ -314,11 +345,15 @@ impl<'a> Decision<'a> {
         (-off * off).exp()
     }
 
+    fn curvature_before(&self) -> f64 {
+        self.input.before.map_or(0.0, |motion| motion.curvature_per_m())
+    }
+
     fn steer(&self, motion: &Motion) -> f64 {
         match *motion {
             Motion::Turn { .. } => 0.0,
             Motion::Arc { curvature_per_m, .. } => {
-                let change = (curvature_per_m - self.input.curvature_per_m).abs();
+                let change = (curvature_per_m - self.curvature_before()).abs();
                 (1.0 - change / (2.0 * self.settings.curvature_max_per_m)).max(0.0)
             }
         }

@@ -79,14 +79,20 @@ pub(super) fn select(
     goal: [f64; 2],
     step_m: f64,
 ) -> PathChoice {
+    select_after(None, preset, map, stance, goal, step_m)
+}
+
+fn select_after(
+    before: Option<Motion>,
+    preset: NavigatorPreset,
+    map: &GoodnessMap,
+    stance: &Pose,
+    goal: [f64; 2],
+    step_m: f64,
+) -> PathChoice {
     let goal = stance.inverse_transform_point(&Point3::new(goal[0], goal[1], 0.0));
-    let input = PathInput {
-        goal_m: [goal.x, goal.y],
-        step_m,
-        curvature_per_m: 0.0,
-        map: Some(map),
-        site_from_rover: stance,
-    };
+    let input =
+        PathInput { goal_m: [goal.x, goal.y], step_m, before, map: Some(map), site_from_rover: stance };
     HazardNavigator { settings: preset.settings() }.select_path(&input)
 }
 
@@ -124,6 +130,13 @@ fn a_blocked_corridor_has_no_safe_path() {
     assert!(choice.candidates.iter().all(|candidate| candidate.veto.is_some()));
     let turns = choice.candidates.iter().filter(|path| matches!(path.motion, Motion::Turn { .. }));
     assert!(turns.count() >= 2 && choice.candidates.len() >= 27);
+    // Where it came from it goes back, and not to and fro.
+    let after = |before: Motion| {
+        select_after(Some(before), NavigatorPreset::Gestalt, &map, &stance, [5.0, 0.0], 0.6).motion()
+    };
+    let arc = |length_m: f64| Motion::Arc { length_m, curvature_per_m: 0.4 };
+    assert_eq!(after(arc(0.5)), Some(arc(-0.5)));
+    assert_eq!((after(arc(-0.5)), after(Motion::Turn { angle_rad: 0.3 })), (None, None));
     // Open to the rear, the rover backs up or turns.
     let dead_end = |x: f64, y: f64| if x > 1.25 || y.abs() > 1.15 { -0.5 } else { 0.0 };
     let map = known(&stance, &HazardSettings::default(), dead_end);
@@ -276,7 +289,7 @@ fn check_changes(settings: &HazardSettings, height: fn(f64, f64) -> f64, expecte
     let input = PathInput {
         goal_m: [5.0, 0.0],
         step_m: 0.7,
-        curvature_per_m: 0.0,
+        before: None,
         map: Some(&map),
         site_from_rover: &stance,
     };
@@ -338,8 +351,7 @@ fn the_sentence_of_a_change_has_both_limits_and_the_count() {
 fn without_a_map_the_choice_is_that_of_the_arc_navigator() {
     let stance = pose([1.0, 2.0], 0.4);
     for goal_m in [[3.0, 0.4], [-0.3, 0.1], [0.2, 2.0]] {
-        let input =
-            PathInput { goal_m, step_m: 0.5, curvature_per_m: 0.0, map: None, site_from_rover: &stance };
+        let input = PathInput { goal_m, step_m: 0.5, before: None, map: None, site_from_rover: &stance };
         let blind = ArcNavigator::default();
         assert_eq!(HazardNavigator::default().select_path(&input), blind.select_path(&input));
         assert_eq!(blind.select_path(&input).motion(), Some(blind.motion(goal_m, 0.5)));

@@ -101,7 +101,7 @@ impl StoppedDrive<'_> {
         let input = PathInput {
             goal_m: last.goal.in_rover_m,
             step_m: 0.0,
-            curvature_per_m: 0.0,
+            before: None,
             map: Some(&hazards.map),
             site_from_rover: &site_from_rover,
         };
