@@ -130,13 +130,10 @@ fn a_blocked_corridor_has_no_safe_path() {
     assert!(choice.candidates.iter().all(|candidate| candidate.veto.is_some()));
     let turns = choice.candidates.iter().filter(|path| matches!(path.motion, Motion::Turn { .. }));
     assert!(turns.count() >= 2 && choice.candidates.len() >= 27);
-    // Where it came from it goes back, and not to and fro.
-    let after = |before: Motion| {
-        select_after(Some(before), NavigatorPreset::Gestalt, &map, &stance, [5.0, 0.0], 0.6).motion()
-    };
-    let arc = |length_m: f64| Motion::Arc { length_m, curvature_per_m: 0.4 };
-    assert_eq!(after(arc(0.5)), Some(arc(-0.5)));
-    assert_eq!((after(arc(-0.5)), after(Motion::Turn { angle_rad: 0.3 })), (None, None));
+    // From where it came it would get no nearer to the goal either.
+    let before = Some(Motion::Arc { length_m: 0.5, curvature_per_m: 0.4 });
+    let after = select_after(before, NavigatorPreset::Gestalt, &map, &stance, [5.0, 0.0], 0.6);
+    assert_eq!(after.motion(), None);
     // Open to the rear, the rover backs up or turns.
     let dead_end = |x: f64, y: f64| if x > 1.25 || y.abs() > 1.15 { -0.5 } else { 0.0 };
     let map = known(&stance, &HazardSettings::default(), dead_end);
@@ -246,6 +243,13 @@ fn the_rover_does_not_back_up_over_ground_that_it_has_not_seen() {
                 .find(|path| matches!(path.motion, Motion::Arc { length_m, .. } if length_m < 0.0));
             let veto = back.unwrap().veto.unwrap();
             assert_eq!((veto.term, veto.limit), (HazardTerm::Unknown, 0.0));
+            // It goes back the way that it came, and not to and fro.
+            let after = |before: Motion| {
+                select_after(Some(before), NavigatorPreset::Gestalt, &map, &stance, [-4.0, 0.0], 0.6).motion()
+            };
+            let arc = |length_m: f64| Motion::Arc { length_m, curvature_per_m: 0.4 };
+            assert_eq!(after(arc(0.5)), Some(arc(-0.5)));
+            assert_eq!((after(arc(-0.5)), after(Motion::Turn { angle_rad: 0.3 })), (None, None));
         }
     }
 }
