@@ -202,7 +202,7 @@ fn a_match_far_from_the_prediction_must_score_more() {
         "{}",
         reason(&doubted)
     );
-    // Nothing near the prediction looks like the target. A large factor takes what is there.
+    // No place near the prediction looks like the target; with a large factor, one of them is taken all the same.
     let matched = |factor: f64| {
         let changes = [
             ("far_miss_factor", json!(factor)),

@@ -9,8 +9,8 @@
 //! | select_path | 300 s with a hazard map: its pair, the map and the path | R149 |
 //! | drive | 3.75 cm/s, 2.1°/s | domain.md 5.4 |
 //!
-//! The other tasks take what is missing to the first line of Table IV: two updates without a motion in two minutes (R143). The other lines
-//! and the 19 min of checkout 2 then test the model.
+//! The time of the other tasks is chosen such that an update takes one minute, as in the first line of Table IV (R143): two updates in two
+//! minutes, without a motion. The other lines of the table, and the 19 min of checkout 2, are not used and test the model.
 //!
 //! Unit: s.
 

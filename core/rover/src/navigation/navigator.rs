@@ -19,8 +19,8 @@
 //! | κ, κ_now | curvature of the path, and of the motion before | 1/m |
 //! | κ_max | `curvature_max_per_m` | 1/m |
 //!
-//! The wheels have been on the ground of the motion before, whatever the map says of it now. This happens where a rock looks higher from
-//! near than it did from afar, and straight back lies unseen ground.
+//! The motion before is driven backwards where a rock appears higher from a short distance than it did from farther away, and the ground
+//! straight behind was not seen. It has no veto because the wheels have just passed that ground.
 //!
 //! Without a way the candidates follow the route (`route.rs`), and without a route the straight line. A turn after which no arc passes has
 //! the veto of the arc that gets farthest: a rover in a closed pocket has no safe path, instead of turning for ever.

@@ -1,20 +1,25 @@
-//! Matches near the prediction and far from it: of two places that look nearly alike, the one near the prediction is taken.
+//! Prefers a match near the prediction to one far from it if their scores are similar (ours).
 //!
 //! ```text
 //! far    νᵀ (Σ_pred + Σ_match)⁻¹ ν > far_sigma²                     ν = pixel − predicted
 //! near   instead of a far match if   s_near ≥ far_ncc_min   and   1 − s_near < far_miss_factor · (1 − s_far)
 //! ```
-//! The highest score of a search window stands, as in the paper, unless it is far and the highest maximum near the prediction misses
-//! little more of 1. Without this, an edge of a shadow that scored 0.948 was taken 38 px (40 σ) from the prediction, where the target
-//! itself scored 0.940. A window of N independent pixels is `((1 − s_near²) / (1 − s_far²))^(N/2)` times as likely at the far place;
-//! with N about 40 a factor of 2 is as much as the prediction says against it, even if one of a thousand is wrong anywhere in the
-//! window. A match near the prediction that scores less is not taken: the target itself may lie outside the search window. Only
-//! correlation has scores of this kind: with another `measure`, and after a descent, the highest score stands.
+//! Kim et al. take the highest score of the search window. If that match is far from the prediction, and the highest maximum near the
+//! prediction fulfils both conditions, the latter is taken. Example: the edge of a shadow, 38 px (40 σ) from the prediction, scored 0.948;
+//! the target scored 0.940 and was lost without a failed gate.
+//!
+//! Why a factor of 2: for a window of N independent pixels, the likelihood ratio of the far place to the near one is
+//! `((1 − s_near²) / (1 − s_far²))^(N/2)`. With N = 40 and a factor of 2 it is 10⁶, about the prior ratio of the two places if one prediction
+//! in a thousand is wrong. Why `far_ncc_min`: where the target is outside the search window, the best match near the prediction scores less,
+//! and taking it would be false tracking.
+//!
+//! It applies to normalised correlation only, not to other measures or after a descent.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
 //! | Σ_pred | `predicted_covariance_px2` | px² |
 //! | Σ_match | `covariance_px2` of the peak | px² |
+//! | ν | offset of the match from the prediction | px |
 //! | s | score | – |
 
 use nalgebra::{Matrix2, Vector2};

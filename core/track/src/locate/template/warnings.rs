@@ -60,7 +60,7 @@ pub enum WarningKind {
 pub struct Warning {
     /// What is wrong.
     pub kind: WarningKind,
-    /// What was measured, px for `left_right`, otherwise a share.
+    /// The measured value: px for `left_right`, a fraction for the others.
     pub value: f64,
     /// The limit it exceeds, or falls below.
     pub limit: f64,
