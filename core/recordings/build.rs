@@ -1,11 +1,11 @@
-//! Hands the digest of the renderer's sources to the compiler.
+//! Passes the digest of the renderer's sources to the compiler.
 
 use std::io;
 use std::path::Path;
 
 use sightline_sources::emit;
 
-/// What decides the radiance of a rendered picture, beside its scenario.
+/// The sources that determine the radiance of a rendered image, beside its scenario.
 const RENDERER: [&str; 5] = [
     "../geometry/src",
     "../vision/src/image",

@@ -1,4 +1,4 @@
-//! Hands the digest of the tracker's sources to the compiler.
+//! Passes the digest of the tracker's sources to the compiler.
 
 use std::io;
 use std::path::Path;

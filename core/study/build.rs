@@ -1,4 +1,4 @@
-//! Hands the digest of the sources that decide the row of a study to the compiler.
+//! Passes the digest of the sources that determine a study's rows to the compiler.
 
 use std::io;
 use std::path::Path;

@@ -1,6 +1,6 @@
 //! An endpoint as a type: method, path template, and the types of path, query, body and reply, declared once.
 //!
-//! The server registers a handler for it and the viewer calls it; the template is expanded and escaped here. Names in
+//! The server registers a handler for it and the viewer calls it; this module expands and escapes the template. Names in
 //! braces are the fields of [`Endpoint::At`]; the fields of [`Endpoint::Query`] follow the question mark.
 
 use std::fmt;
@@ -49,7 +49,7 @@ pub trait Endpoint: 'static {
     const METHOD: Method;
     /// Its path below `/api/v1`, with the fields of [`Self::At`] in braces.
     const PATH: &'static str;
-    /// The names in the path.
+    /// The path parameters.
     type At: Clone + Serialize + DeserializeOwned + Send + 'static;
     /// The query parameters; [`NoQuery`] without any.
     type Query: Clone + Default + Serialize + DeserializeOwned + Send + 'static;
@@ -64,7 +64,7 @@ pub trait Reply: Sized + Send + 'static {
     /// Reads the bytes of a body.
     ///
     /// # Errors
-    /// A body of another form.
+    /// Fails if the body is not a valid `Self`.
     fn read(bytes: &[u8]) -> serde_json::Result<Self>;
 }
 
@@ -84,7 +84,7 @@ impl Reply for File {
     }
 }
 
-/// A reply without a body, or with one that has no information.
+/// A reply whose body, if any, is ignored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Done;
 
@@ -102,7 +102,7 @@ pub struct NoQuery {}
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, serde::Deserialize)]
 pub struct NoBody {}
 
-/// A request without its reply's type, as it is sent.
+/// A request as it is sent; the type of its reply is erased.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Call {
     /// Its method.
@@ -142,7 +142,7 @@ impl Call {
         self.method == E::METHOD && self.endpoint == E::PATH
     }
 
-    /// The same call of a revision.
+    /// Makes the call conditional on a revision (`If-Match`).
     #[must_use]
     pub fn at_revision(self, revision: u64) -> Self {
         Self { revision: Some(revision), ..self }
@@ -155,7 +155,7 @@ pub fn path<E: Endpoint>(at: &E::At, query: &E::Query) -> String {
     for (name, text) in fields(at) {
         path = path.replace(&format!("{{{name}}}"), &escaped(&text));
     }
-    // A query that has no text is none; a space is written as in a path.
+    // An empty query is omitted; spaces are escaped as in a path.
     let query = serde_urlencoded::to_string(query).unwrap_or_default().replace('+', "%20");
     if !query.is_empty() {
         path = format!("{path}?{query}");
@@ -173,7 +173,7 @@ fn fields(record: &impl Serialize) -> Vec<(String, String)> {
     fields.into_iter().map(|(name, value)| (name, text(value))).collect()
 }
 
-/// A text in a path or query: all but letters, digits, points, underscores and hyphens percent-encoded.
+/// Percent-encodes a text for a path or query; ASCII letters, digits, dots, underscores and hyphens stay as they are.
 pub fn escaped(text: &str) -> String {
     let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || matches!(byte, b'.' | b'_' | b'-');
     let escape =

@@ -1,4 +1,4 @@
-//! All endpoints, one type each: method, path, then the types of names in the path, query, body and reply.
+//! All endpoints, one type each: method, path, then the types of path parameters, query, body and reply.
 //!
 //! A new endpoint is one entry here, one handler in `server/src/routes`, and its call in the viewer.
 
@@ -68,7 +68,7 @@ macro_rules! endpoints {
     (@or $default:ty, $given:ty) => { $given };
 }
 
-/// The paths of the endpoints that create something: a request with the header `Idempotency-Key` can be sent again without
+/// The paths of the endpoints that create something: a request with the header `Idempotency-Key` can be repeated without
 /// creating it twice.
 pub const CREATING: &[&str] = &[
     AddTraverse::PATH,
@@ -85,9 +85,9 @@ pub const CREATING: &[&str] = &[
 ];
 
 endpoints! {
-    /// What this program is.
+    /// Name, version and limits of the server program.
     ShowVersion: Get "/version", Anywhere => Version;
-    /// Whether the server is well.
+    /// The health and resource usage of the server.
     ShowHealth: Get "/health", Anywhere => Health;
     /// The OpenAPI document.
     ShowOpenApi: Get "/openapi.json", Anywhere => Value;
@@ -98,7 +98,7 @@ endpoints! {
     /// The table of settings.
     ListSettings: Get "/settings", Anywhere => Vec<SettingInfo>;
 
-    /// The traverses that are open.
+    /// The open traverses.
     ListTraverses: Get "/traverses", Anywhere => Vec<TraverseEntry>;
     /// Opens a simulated drive by its scenario.
     AddTraverse: Post "/traverses", Anywhere, body NewTraverse => TraverseEntry;
@@ -110,33 +110,33 @@ endpoints! {
     ShowStop: Get "/traverses/{id}/steps/{step}", AtStop => StopDetail;
     /// An image of a stop as PNG.
     ShowImage: Get "/traverses/{id}/steps/{step}/images/{file}", AtImage, query ImageWish => File;
-    /// The motion to a stop by visual odometry, with its corners.
+    /// The motion to a stop as measured by visual odometry, with its corners.
     ShowStopOdometry: Get "/traverses/{id}/steps/{step}/odometry", AtStop => StopOdometry;
-    /// Renders the stops from this one on before all others.
+    /// Renders the images of the stops from this one on before those of all others.
     Prefetch: Post "/traverses/{id}/prefetch", AtTraverse, query FirstStop => Done;
-    /// The trackability of a stop's left image, as far as it is computed.
+    /// The trackability map of a stop's left image, as far as it is computed.
     ShowTrackability: Get "/traverses/{id}/steps/{step}/trackability", AtStop, query MapLimits => MapProgress;
-    /// The verdict at one pixel.
+    /// The trackability verdict at one pixel.
     ShowTrackabilityAtPixel: Get "/traverses/{id}/steps/{step}/trackability/pixel", AtStop, query MapPixel
         => PixelVerdict;
-    /// Stops computing a map.
+    /// Cancels the computation of a trackability map.
     CancelTrackability: Post "/traverses/{id}/steps/{step}/trackability/cancel", AtStop, query MapLimits => Done;
 
-    /// The recordings below the folders that were named when the server was started.
+    /// The recordings below the folders given when the server was started.
     ListRecordings: Get "/recordings", Anywhere => RecordingList;
-    /// What a recording contains.
+    /// The contents of a recording.
     ShowRecording: Get "/recordings/contents", Anywhere, query RecordingPath => RecordingView;
-    /// Begins to send a recording.
+    /// Begins the upload of a recording.
     BeginUpload: Post "/uploads", Anywhere => UploadView;
-    /// Sends a file of a recording; the body is the file.
+    /// Uploads a file of a recording; the body is the file.
     SendFile: Put "/uploads/{upload}/files", AtUpload, query UploadPath => UploadView;
-    /// Sends a recording as one zip archive; the body is the archive.
+    /// Uploads a recording as one zip archive; the body is the archive.
     SendArchive: Put "/uploads/{upload}/archive", AtUpload => UploadView;
-    /// Removes a recording that was sent.
+    /// Removes an uploaded recording.
     RemoveUpload: Delete "/uploads/{upload}", AtUpload => Done;
     /// Imports a recording as a drive.
     StartImport: Post "/imports", Anywhere, body NewImport => ImportJob;
-    /// How far an import is.
+    /// The state and progress of an import.
     ShowImport: Get "/imports/{import}", AtImport => ImportJob;
     /// Cancels an import.
     CancelImport: Post "/imports/{import}/cancel", AtImport => ImportJob;
@@ -151,15 +151,15 @@ endpoints! {
     ShowSession: Get "/sessions/{session}", AtSession => SessionView;
     /// Removes a session.
     RemoveSession: Delete "/sessions/{session}", AtSession => Done;
-    /// Takes the removal of a session back.
+    /// Restores a removed session.
     RestoreSession: Post "/sessions/{session}/restore", AtSession => SessionView;
     /// The cursor of a session.
     ShowCursor: Get "/sessions/{session}/cursor", AtSession => Cursor;
     /// Moves the cursor.
     MoveCursor: Put "/sessions/{session}/cursor", AtSession, body Cursor => Cursor;
-    /// The drive of a session: who drives, the decisions and the outcome so far.
+    /// The drive of a session: the driving run, its command, the decisions and the outcome so far.
     ShowDrive: Get "/sessions/{session}/drive", AtSession => DriveView;
-    /// Lets a run drive, or changes its command.
+    /// Sets the run that drives, and its command.
     SteerDrive: Put "/sessions/{session}/drive", AtSession, body Steering => DriveView;
     /// The goodness map at a stop of the drive of a session.
     ShowHazards: Get "/sessions/{session}/drive/steps/{step}/hazards", AtDriveStop => HazardView;
@@ -171,7 +171,7 @@ endpoints! {
     ReadRecording: Get "/sessions/{session}/rerun/live.rrd", AtSession => File;
     /// A file of Rerun's web viewer.
     ShowRerunViewer: Get "/rerun/{file}", AtViewerFile => File;
-    /// What a session can be exported as.
+    /// The files to which a session can be exported.
     ListExports: Get "/sessions/{session}/exports", AtSession, query SessionPart => Vec<ExportEntry>;
     /// A session, or a part of it, as a file.
     ExportFile: Get "/sessions/{session}/exports/{file}", AtExport, query SessionPart => File;
@@ -186,22 +186,22 @@ endpoints! {
     RenameTarget: Put "/sessions/{session}/targets/{target}/label", AtTarget, body TargetLabel => SessionView;
     /// Removes a target.
     RemoveTarget: Delete "/sessions/{session}/targets/{target}", AtTarget => SessionView;
-    /// Takes the removal of a target back.
+    /// Restores a removed target.
     RestoreTarget: Post "/sessions/{session}/targets/{target}/restore", AtTarget => SessionView;
 
     /// Runs a target again from a step with changed settings.
     ForkRun: Post "/sessions/{session}/targets/{target}/runs", AtTarget, body NewRun => RunView;
-    /// A run so far.
+    /// A run with its steps so far.
     ShowRun: Get "/sessions/{session}/targets/{target}/runs/{run}", AtRun, query FirstRow => RunView;
     /// Removes a run.
     RemoveRun: Delete "/sessions/{session}/targets/{target}/runs/{run}", AtRun => SessionView;
-    /// Takes the removal of a run back.
+    /// Restores a removed run.
     RestoreRun: Post "/sessions/{session}/targets/{target}/runs/{run}/restore", AtRun => SessionView;
     /// Stops a run.
     CancelRun: Post "/sessions/{session}/targets/{target}/runs/{run}/cancel", AtRun => RunView;
-    /// Lets a stopped run go on.
+    /// Resumes a stopped run.
     ResumeRun: Post "/sessions/{session}/targets/{target}/runs/{run}/resume", AtRun => RunView;
-    /// Begins a drive on commands with a run.
+    /// Begins a drive on commands that a run steers, in a world of its own.
     BeginDrive: Post "/sessions/{session}/targets/{target}/runs/{run}/drive", AtRun, body NewDrive => SessionView;
     /// The metrics of a run.
     ShowMetrics: Get "/sessions/{session}/targets/{target}/runs/{run}/metrics", AtRun => RunMetrics;
@@ -212,28 +212,28 @@ endpoints! {
 
     /// A step.
     ShowStep: Get "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}", AtStep => RunStep;
-    /// What the stages of a step take on Mars, and took here.
+    /// The times of the stages of a step: modelled on Mars, and measured on this machine.
     ShowTimes: Get "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/times", AtStep => Vec<StageTime>;
     /// All arrays of a step as one NumPy archive.
     ShowArrays: Get "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/arrays.npz", AtStep => File;
-    /// The view of a step against the earlier templates of its run.
+    /// The match of a step's image with each earlier template of its run.
     ShowEarlierTemplates: Get "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/earlier_templates", AtStep
         => Vec<AgainstEarlier>;
     /// A plain page of a step.
     ShowStepPage: Get "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/page", AtStep => File;
-    /// Where a value of a step came from.
+    /// The explanation of a value of a step: its inputs, formula and settings.
     ShowWhy: Get "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/why", AtStep, query ValueName
         => Explanation;
     /// Tries a step with changed settings or a displaced prediction.
     TryStep: Post "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/what_if", AtStep, body WhatIf
         => Ghost;
-    /// What would have saved a step, as far as it is known.
+    /// The counterfactual of a step as far as it is computed: the smallest changes with which it would have been accepted.
     ShowCounterfactual: Get "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/counterfactual", AtStep
         => Question;
-    /// Searches for what would have saved a step.
+    /// Starts the search for the smallest changes with which a step would have been accepted.
     AskCounterfactual: Post "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/counterfactual", AtStep
         => Question;
-    /// Stops that search.
+    /// Cancels that search.
     CancelCounterfactual: Post
         "/sessions/{session}/targets/{target}/runs/{run}/steps/{step}/counterfactual/cancel", AtStep => Question;
 
@@ -243,11 +243,11 @@ endpoints! {
     AddNote: Post "/sessions/{session}/notes", AtSession, body NewNote => Note;
     /// A note.
     ShowNote: Get "/sessions/{session}/notes/{note}", AtNote => Note;
-    /// Changes a note of the revision that was read.
+    /// Changes a note if its revision is still the one that was read.
     ChangeNote: Patch "/sessions/{session}/notes/{note}", AtNote, body EditNote => Note;
-    /// Removes a note of the revision that was read.
+    /// Removes a note if its revision is still the one that was read.
     RemoveNote: Delete "/sessions/{session}/notes/{note}", AtNote => Done;
-    /// Brings a removed note back.
+    /// Restores a removed note.
     RestoreNote: Post "/sessions/{session}/notes/{note}/restore", AtNote => Note;
 
     /// The breakpoints of a session.
@@ -259,9 +259,9 @@ endpoints! {
         => BreakpointView;
     /// Removes a breakpoint.
     RemoveBreakpoint: Delete "/sessions/{session}/breakpoints/{breakpoint}", AtBreakpoint => Done;
-    /// The language of expressions.
+    /// The functions and names of the expression language.
     ShowExpressions: Get "/expressions", Anywhere => Language;
-    /// What could be written at a position of an expression.
+    /// The completions at a position of an expression.
     CompleteExpression: Post "/expressions/complete", Anywhere, body CompletionQuery => Completion;
     /// Evaluates an expression at every step of every run.
     QuerySession: Post "/sessions/{session}/query", AtSession, body Query => QueryAnswer;
@@ -277,15 +277,15 @@ endpoints! {
 
     /// The studies that can be started.
     ListStudies: Get "/studies", Anywhere => Vec<StudyInfo>;
-    /// The studies that were started.
+    /// The study jobs: studies that were started.
     ListStudyJobs: Get "/studies/jobs", Anywhere => Vec<StudyJob>;
     /// Starts a study.
     StartStudy: Post "/studies/jobs", Anywhere, body NewStudy => StudyJob;
-    /// The state of a study.
+    /// The state of a study job.
     ShowStudyJob: Get "/studies/jobs/{job}", AtStudyJob => StudyJob;
     /// Stops a study.
     CancelStudy: Post "/studies/jobs/{job}/cancel", AtStudyJob => StudyJob;
-    /// Lets a stopped study go on.
+    /// Resumes a stopped study.
     ResumeStudy: Post "/studies/jobs/{job}/resume", AtStudyJob => StudyJob;
     /// The table of a study, as far as it is computed.
     ShowStudyRows: Get "/studies/jobs/{job}/rows", AtStudyJob => StudyRows;

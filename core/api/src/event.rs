@@ -1,4 +1,4 @@
-//! Events: what the server tells every open page over the WebSocket.
+//! Events that the server sends to every open page over the WebSocket.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -8,11 +8,11 @@ use sightline_study::wire::StudyJob;
 
 use crate::recording::ImportJob;
 
-/// What the server tells every open page over the WebSocket.
+/// An event that the server sends to every open page over the WebSocket.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum Event {
-    /// Something of a session changed: read its view again.
+    /// A session changed: read its view again.
     SessionChanged {
         /// The session.
         session: String,
@@ -27,19 +27,19 @@ pub enum Event {
         /// The traverse.
         traverse: String,
     },
-    /// An import of a recording went on.
+    /// The import of a recording progressed.
     ImportProgress {
-        /// How far it is.
+        /// The import with its progress.
         job: ImportJob,
     },
     /// The cursor of a session was moved; nothing else of it changed.
     CursorMoved {
         /// The session.
         session: String,
-        /// Where to.
+        /// The new cursor.
         cursor: Cursor,
     },
-    /// A run went on.
+    /// A run progressed.
     RunProgress {
         /// The session.
         session: String,
@@ -53,7 +53,7 @@ pub enum Event {
         n: usize,
         /// Whether it has ended.
         ended: bool,
-        /// The present activity, in words.
+        /// The current activity, in words.
         doing: String,
     },
     /// Images of a simulated traverse were rendered.
@@ -64,15 +64,15 @@ pub enum Event {
         k: usize,
         /// Stops in all.
         n: usize,
-        /// The stop that became ready, where one did.
+        /// The stop that became ready; null if none did.
         ready: Option<usize>,
     },
-    /// A study went on.
+    /// A study progressed.
     StudyProgress {
-        /// How it stands.
+        /// The study with its progress.
         job: StudyJob,
     },
-    /// Rows of a stop's trackability were made.
+    /// Rows of a stop's trackability map were computed.
     TrackabilityProgress {
         /// The traverse.
         traverse: String,
@@ -80,12 +80,12 @@ pub enum Event {
         step: usize,
         /// Rows of cells done.
         k: usize,
-        /// Rows of cells in all; 0 before that is known.
+        /// Rows of cells in all; 0 while that is unknown.
         n: usize,
-        /// Whether nothing more will come.
+        /// Whether the computation has ended.
         ended: bool,
     },
-    /// What would have saved a step is being looked for: read the question again.
+    /// The search for a counterfactual of a step progressed: read the question again.
     QuestionProgress {
         /// The session.
         session: String,
@@ -95,9 +95,9 @@ pub enum Event {
         run: usize,
         /// The step.
         step: usize,
-        /// Settings and places looked at.
+        /// Candidates examined.
         k: usize,
-        /// How many there are.
+        /// Candidates in all.
         n: usize,
         /// Whether it has ended.
         ended: bool,

@@ -1,4 +1,4 @@
-//! The names in paths: one type for each kind of thing that a path can name.
+//! The path parameters: one type for each kind of resource that a path can name.
 
 use serde::{Deserialize, Serialize};
 use utoipa::IntoParams;
@@ -46,7 +46,7 @@ pub struct AtImport {
     pub import: String,
 }
 
-/// A recording that a page sends.
+/// An upload of a recording.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, IntoParams)]
 #[into_params(parameter_in = Path)]
 pub struct AtUpload {

@@ -3,20 +3,20 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// The default of the server's limit `file_bytes`, bytes: the largest exported session that it takes. One with 500 notes of
-/// 4,000 characters each fits.
+/// The default of the server's limit `file_bytes`, bytes: the largest exported session that it accepts. A session with
+/// 500 notes of 4,000 characters each fits.
 pub const FILE_BYTES: usize = 8 << 20;
 
-/// What this program is.
+/// Name, version and limits of the server program.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Version {
     /// The program's name.
     pub name: String,
     /// Its version.
     pub version: String,
-    /// The version of the folders of traverses.
+    /// The version of the format of traverse folders.
     pub traverse_format: u32,
-    /// The version of saved sessions.
+    /// The version of the format of saved sessions.
     pub session_format: u32,
     /// The limits in force.
     pub limits: Limits,
@@ -34,18 +34,18 @@ pub struct Limits {
     pub runs: usize,
 }
 
-/// Whether the server is well.
+/// The health and resource usage of the server.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Health {
     /// `ok`.
     pub status: String,
-    /// What a person should know about this start of the server, one sentence each.
+    /// Notices about this start of the server, one sentence each.
     pub notices: Vec<String>,
-    /// What the server takes of the machine.
+    /// The resources that the server uses.
     pub usage: Usage,
 }
 
-/// What a server takes of its machine.
+/// The resources that the server uses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct Usage {
     /// Open connections.
@@ -56,8 +56,8 @@ pub struct Usage {
     pub step_bytes: usize,
     /// Answers to requests with an Idempotency-Key in memory, bytes (limit `answer_bytes`).
     pub answer_bytes: usize,
-    /// Threads of the process; null where the system does not tell.
+    /// Threads of the process; null if the system does not report them.
     pub threads: Option<u64>,
-    /// Resident memory of the process, bytes; null where the system does not tell.
+    /// Resident memory of the process, bytes; null if the system does not report it.
     pub resident_bytes: Option<u64>,
 }

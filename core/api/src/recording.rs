@@ -1,17 +1,17 @@
-//! Recordings on the server's machine: which there are, what one contains, and its import as a drive.
+//! Recordings on the server's machine: their list, their contents, and their import as drives.
 
 use serde::{Deserialize, Serialize};
 use sightline_geometry::stereo_geometry::StereoGeometry;
 use utoipa::{IntoParams, ToSchema};
 
-/// The recordings below the folders that were named when the server was started.
+/// The recordings below the folders given when the server was started.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct RecordingList {
-    /// Those folders; empty: the server opens no recordings by their path.
+    /// Those folders; if empty, the server opens no recordings by path.
     pub folders: Vec<String>,
     /// The recordings, by path.
     pub recordings: Vec<RecordingEntry>,
-    /// Whether these are all; false beyond the limit `recordings`.
+    /// Whether the list is complete; false beyond the limit `recordings`.
     pub is_complete: bool,
 }
 
@@ -29,11 +29,11 @@ pub struct RecordingEntry {
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct RecordingPath {
-    /// Its folder or file: absolute, or relative to a folder that was named when the server was started.
+    /// Its folder or file: absolute, or relative to a folder given when the server was started.
     pub path: String,
 }
 
-/// What a recording contains, before it is imported.
+/// The contents of a recording, before its import.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct RecordingView {
     /// Its folder or file.
@@ -42,25 +42,25 @@ pub struct RecordingView {
     pub format: String,
     /// The name that its drive will have.
     pub name: String,
-    /// How many stops it has.
+    /// Number of stops.
     pub stop_count: usize,
-    /// How many images it has, those of further cameras included.
+    /// Number of images, further cameras included.
     pub image_count: usize,
     /// Size of the left image of the first stop (width, height), px.
     pub left_size: [u32; 2],
     /// Size of the right image of the first stop (width, height), px.
     pub right_size: [u32; 2],
-    /// How the two images of a stop relate.
+    /// The geometry of the stereo pair.
     pub stereo: StereoGeometry,
-    /// The images that form the stereo pairs of the first stops and of the last one.
+    /// The stereo pairs of the first stops and of the last one.
     pub pairs: Vec<RecordedPair>,
-    /// The names of the cameras beside the main pair.
+    /// The names of the cameras other than the main pair.
     pub further_cameras: Vec<String>,
     /// Whether the true poses are known.
     pub has_truth: bool,
-    /// Whether it is opened where it is; otherwise its images are copied.
+    /// Whether it is opened in place; otherwise its images are copied.
     pub is_opened_in_place: bool,
-    /// What is left out or assumed, one sentence each.
+    /// Omissions and assumptions of the import, one sentence each.
     pub notes: Vec<String>,
 }
 
@@ -75,16 +75,16 @@ pub struct RecordedPair {
     pub right: String,
 }
 
-/// A recording that a page sends.
+/// An upload of a recording.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct UploadView {
     /// Its name in paths.
     pub id: String,
-    /// The folder that its files are in, which `GET recordings/contents` takes.
+    /// The folder of its files, as the path for `GET recordings/contents`.
     pub path: String,
-    /// How many files have arrived.
+    /// Number of files received.
     pub files: usize,
-    /// How many bytes have arrived, or were unpacked.
+    /// Number of bytes received or unpacked.
     pub bytes: u64,
 }
 
@@ -93,7 +93,7 @@ pub struct UploadView {
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct UploadPath {
-    /// Its path in the recording, with `/`: for example `drive/image_0/000000.png`.
+    /// Its path in the recording, separated by `/`: for example `drive/image_0/000000.png`.
     pub path: String,
 }
 
@@ -112,38 +112,38 @@ pub struct ImportJob {
     pub id: String,
     /// The recording.
     pub path: String,
-    /// How far it is.
+    /// The state of the import.
     pub state: ImportState,
     /// Images done.
     pub k: usize,
-    /// Images in all; 0 before that is known.
+    /// Images in all; 0 while that is unknown.
     pub n: usize,
-    /// The drive, once it is done.
+    /// The id of the drive; null until the import is done.
     pub traverse: Option<String>,
-    /// Why it failed.
+    /// Why it failed; null otherwise.
     pub problem: Option<String>,
-    /// What was left out or assumed, one sentence each.
+    /// Omissions and assumptions of the import, one sentence each.
     pub notes: Vec<String>,
 }
 
-/// How far an import is.
+/// The state of an import.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ImportState {
-    /// Others are before it.
+    /// It waits for other imports.
     Waiting,
-    /// Images are copied.
+    /// Images are being copied.
     Running,
     /// The drive is open.
     Done,
-    /// It was cancelled; nothing of it is kept.
+    /// It was cancelled; nothing is kept.
     Cancelled,
-    /// It failed; nothing of it is kept.
+    /// It failed; nothing is kept.
     Failed,
 }
 
 impl ImportState {
-    /// Whether nothing more will come.
+    /// Whether the import has ended.
     pub const fn has_ended(self) -> bool {
         matches!(self, Self::Done | Self::Cancelled | Self::Failed)
     }

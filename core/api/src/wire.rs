@@ -1,5 +1,5 @@
-//! What page and server say to each other, beside the types of `sightline_session::view`: requests, the traverse, and events.
-//! Server and viewer never see each other's code; these types are their whole common language.
+//! Requests and replies that viewer and server exchange, in addition to the types of `sightline_session::view`. Server and
+//! viewer do not depend on each other; they share these types alone.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -21,15 +21,15 @@ use sightline_track::settings::Changes;
 pub struct TraverseEntry {
     /// Its name in paths.
     pub id: String,
-    /// Its short name.
+    /// Its display name.
     pub name: String,
-    /// What was recorded.
+    /// A description in words.
     pub description: String,
-    /// Whether its images are rendered.
+    /// Whether its images are simulated, and rendered on demand.
     pub simulated: bool,
-    /// How many stops it has.
+    /// Number of stops.
     pub stop_count: usize,
-    /// Whether it can be removed: it was opened by its scenario, not given when the server was started.
+    /// Whether it can be removed: true if it was opened by a request, false if it was given when the server was started.
     pub removable: bool,
 }
 
@@ -40,19 +40,19 @@ pub struct SessionEntry {
     pub id: String,
     /// The traverse's name in paths.
     pub traverse: String,
-    /// How many targets it has.
+    /// Number of targets.
     pub target_count: usize,
-    /// The traverse's short name.
+    /// The traverse's display name.
     pub traverse_name: String,
-    /// How many runs its targets have.
+    /// Number of runs of all targets.
     pub run_count: usize,
-    /// The step that was looked at last.
+    /// The step of the cursor.
     pub step: usize,
-    /// How many stops the traverse has.
+    /// Number of stops of the traverse.
     pub stop_count: usize,
-    /// When something of it was changed or stepped through last: RFC 3339, UTC; null where that is not known.
+    /// Time of the last change or cursor move: RFC 3339, UTC; null if unknown.
     pub used: Option<String>,
-    /// How long ago that was, s.
+    /// Time since then, s; null if unknown.
     pub idle_s: Option<f64>,
 }
 
@@ -69,17 +69,17 @@ pub struct NewTraverse {
 pub struct TraverseView {
     /// Its name in paths.
     pub id: String,
-    /// Its short name.
+    /// Its display name.
     pub name: String,
-    /// What was recorded.
+    /// A description in words.
     pub description: String,
-    /// Whether its images are rendered.
+    /// Whether its images are simulated, and rendered on demand.
     pub simulated: bool,
-    /// What opens it on the command line of the server's machine: a scenario of the library, or its folder.
+    /// The command-line argument that opens it on the server's machine: a scenario of the library, or its folder.
     pub source: String,
-    /// How the two images of a stop relate.
+    /// The geometry of the stereo pair.
     pub stereo: StereoGeometry,
-    /// What was odd when it was opened.
+    /// Warnings from opening it.
     pub warnings: Vec<String>,
     /// The error model of the pose estimates.
     #[serde(default)]
@@ -95,36 +95,36 @@ pub struct StopView {
     pub time_s: f64,
     /// The estimated pose in the site frame.
     pub site_from_rover: PoseRecord,
-    /// The true pose, where it is known.
+    /// The true pose; null if unknown.
     pub true_site_from_rover: Option<PoseRecord>,
     /// Size of the left image (width, height), px.
     pub left_size: [u32; 2],
     /// Size of the right image (width, height), px.
     pub right_size: [u32; 2],
-    /// Whether the images are there; those of a simulated traverse are rendered when they are first asked for.
+    /// Whether the images exist; those of a simulated traverse are rendered on the first request.
     pub ready: bool,
-    /// How vision measured the motion to this stop; left out where it did not.
+    /// The motion to this stop as measured by visual odometry; left out if it was not measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub odometry: Option<MeasuredMotion>,
-    /// The cameras beside the main pair.
+    /// The cameras other than the main pair.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cameras: Vec<StopCameraView>,
 }
 
-/// A camera of a stop beside its main pair.
+/// A camera of a stop other than the main pair.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct StopCameraView {
     /// Its name.
     pub name: CameraName,
     /// Size of its left or only image (width, height), px.
     pub left_size: [u32; 2],
-    /// Size of its right image (width, height), px; null for a single camera, in which nothing can be tracked.
+    /// Size of its right image (width, height), px; null for a single camera, in which tracking is not possible.
     pub right_size: Option<[u32; 2]>,
     /// The angles of the mast; null for a camera on the body.
     pub mast: Option<MastAngles>,
 }
 
-/// The models of a camera beside the main pair, in the rover frame.
+/// The models of a camera other than the main pair, in the rover frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct StopCameraModels {
     /// Its name.
@@ -138,27 +138,27 @@ pub struct StopCameraModels {
 /// One stop with its cameras.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct StopDetail {
-    /// What the traverse says of it.
+    /// The stop as in the traverse.
     pub stop: StopView,
     /// The left camera in the rover frame, m and px.
     pub left: Camera,
     /// The right camera in the rover frame, m and px.
     pub right: Camera,
-    /// The angles of the mast; none without a mast.
+    /// The angles of the mast; null without a mast.
     pub mast: Option<MastAngles>,
-    /// The models of the cameras beside the main pair.
+    /// The models of the cameras other than the main pair.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cameras: Vec<StopCameraModels>,
 }
 
-/// How vision measured the motion to a stop, corner by corner.
+/// The motion to a stop as measured by visual odometry, with its corners.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct StopOdometry {
     /// The settings of the preset.
     pub settings: OdometrySettings,
-    /// The pose by the wheels and the update with its gates, slip and covariance.
+    /// The pose by wheel odometry, and the update with its gates, slip and covariance.
     pub measured: MeasuredMotion,
-    /// The corners of the left image of the stop before; no drive stores them, they are computed again.
+    /// The corners of the left image of the previous stop; they are not stored but recomputed on request.
     pub corners: Vec<OdometryCorner>,
 }
 
@@ -184,13 +184,13 @@ pub struct NewSession {
 pub struct NewTarget {
     /// The stop at which it is designated.
     pub step: usize,
-    /// The pair of the stop in which it is designated and tracked; left out: the main pair.
+    /// The stereo pair in which it is designated and tracked; default: the main pair.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<CameraName>,
     /// Its position in the left image, px.
     #[serde(default)]
     pub pixel: Option<Pixel>,
-    /// The mast angles at which that image was taken; left out: those of the stop.
+    /// The mast angles at which that image was taken; default: those of the stop.
     #[serde(default)]
     pub mast: Option<MastAngles>,
     /// Its position in the rover frame of the stop, m.
@@ -201,7 +201,7 @@ pub struct NewTarget {
     #[serde(default)]
     #[schema(min_items = 3, max_items = 3)]
     pub point_in_site: Option<[f64; 3]>,
-    /// What to call it.
+    /// Its label; default: `target` and its number.
     #[serde(default)]
     pub label: Option<String>,
     /// Settings that differ from the defaults, by name.
@@ -225,7 +225,7 @@ impl NewTarget {
         }
     }
 
-    /// What was said of the target.
+    /// Where the target is designated.
     pub fn place(&self) -> Place {
         Place {
             camera: self.camera,
@@ -237,22 +237,22 @@ impl NewTarget {
     }
 }
 
-/// The name of a target.
+/// The label of a target.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TargetLabel {
-    /// The name; blank: `target` and its number.
+    /// The label; if blank, `target` and its number.
     pub label: String,
 }
 
-/// A target that was designated, with the session that now has it.
+/// A designated target, and the session that contains it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Designated {
     /// The target's number in paths.
     pub target: usize,
-    /// How far the surface that stereo found lies from the point that was given, m; null for a pixel.
+    /// Distance of the surface point found by stereo from the given point, m; null if a pixel was given.
     pub gap_m: Option<f64>,
-    /// The session with it.
+    /// The session after the designation.
     pub session: SessionView,
 }
 
@@ -260,7 +260,7 @@ pub struct Designated {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewRun {
-    /// The run to leave.
+    /// The run to fork from.
     pub run: usize,
     /// The first step to compute anew.
     pub from_step: usize,
@@ -268,31 +268,31 @@ pub struct NewRun {
     #[serde(default)]
     #[schema(value_type = Object)]
     pub settings: Changes,
-    /// Where to put the prediction of that one step in the left image, px; left out: where dead reckoning has it.
+    /// The prediction of that one step in the left image, px; default: by dead reckoning.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prediction_px: Option<Pixel>,
 }
 
-/// Begins a drive on commands with a run, in a world of its own.
+/// Begins a drive on commands that a run steers, in a world of its own.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewDrive {
-    /// What the rover is told.
+    /// The command of the drive.
     #[serde(default)]
     pub command: DriveCommand,
-    /// The targets to which it drives afterwards, in this order, by their numbers.
+    /// Numbers of the targets to which it drives afterwards, in this order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub then: Vec<usize>,
-    /// Faults to be injected, beside those of the drive from which it branches.
+    /// Faults to inject, in addition to those of the drive from which it branches.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub faults: Vec<NewFault>,
-    /// The stop from which it drives; left out: the last one of a drive on commands, the first one of any other.
+    /// The stop from which it drives; default: the last stop of a drive on commands, the first stop of any other.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub from_step: Option<usize>,
-    /// The stop at which it waits; left out: it drives on.
+    /// The stop at which it pauses; default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pause_at: Option<usize>,
-    /// The stage of that stop before or after which it waits; left out: before `drive`, once the target is located.
+    /// Pause before or after a stage of that stop; default: before `drive`, once the target is located.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pause: Option<StagePause>,
 }
@@ -300,9 +300,9 @@ pub struct NewDrive {
 /// The live Rerun stream of a session.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct RerunStream {
-    /// Path below `/api/v1/` of the page that shows it.
+    /// Path below `/api/v1/` of the page that displays it.
     pub viewer_path: String,
-    /// Path below `/api/v1/` of the recording, for another viewer: `curl -N … | rerun -`.
+    /// Path below `/api/v1/` of the recording, for an external viewer: `curl -N … | rerun -`.
     pub stream_path: String,
 }
 
@@ -315,23 +315,23 @@ pub struct Problem {
     pub title: String,
     /// The HTTP status.
     pub status: u16,
-    /// One sentence that names the culprit.
+    /// One sentence that names the field or object at fault.
     pub detail: String,
-    /// How to mend it.
+    /// How to correct the request.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hint: Option<String>,
-    /// The nearest pixel of the left image that would do, where one was refused.
+    /// The nearest acceptable pixel of the left image, if a pixel was refused.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub nearest_pixel: Option<Box<Pixel>>,
-    /// Which request it answers, and when; what the server adds on the way out.
+    /// The request's id and time; added by the server when it replies.
     #[serde(flatten, default, skip_serializing_if = "Option::is_none")]
     pub received: Option<Box<Received>>,
 }
 
-/// By which a person's report finds the lines of the server's log.
+/// Identifies a request in the server's log.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct Received {
-    /// The request's name in the log.
+    /// The request's id in the log.
     pub request_id: String,
     /// When it was answered: RFC 3339, UTC.
     pub time: String,
@@ -351,7 +351,7 @@ impl Problem {
         }
     }
 
-    /// The field of the request that is at fault, where the sentence begins with its name.
+    /// The field of the request at fault; `None` if `detail` does not begin with its name.
     pub fn field(&self) -> Option<&str> {
         let is_named = matches!(self.code.as_str(), "field" | "setting" | "query" | "expression");
         let name = self.detail.split_once(": ").map(|(name, _)| name).filter(|_| is_named)?;
@@ -361,16 +361,16 @@ impl Problem {
     }
 }
 
-/// Characters of a text.
+/// A range of characters in a text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct TextRange {
-    /// The first one, from 0.
+    /// The first character, from 0.
     pub from: usize,
-    /// The first one after it.
+    /// The first character after the range.
     pub to: usize,
 }
 
-/// Where in a request something is wrong.
+/// The location of a fault in a request.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct ProblemPlace {
     /// The field of the request.
@@ -385,7 +385,7 @@ pub struct ExpressionProblem {
     /// The problem.
     #[serde(flatten)]
     pub problem: Problem,
-    /// Where it is.
+    /// The location of the fault.
     #[serde(flatten)]
     pub place: ProblemPlace,
 }

@@ -1,30 +1,30 @@
-//! A request to stop a long computation: set by whoever waits for the result, read by the loops that make it.
+//! A request to stop a long computation: set by the caller, read by the loops that compute the result.
 //!
-//! A computation that was interrupted returns anything of its type at once; the function that hands the flag in
-//! discards that result and returns [`Error::Cancelled`].
+//! An interrupted computation immediately returns any value of its type; the function that passed the flag discards
+//! that value and returns [`Error::Cancelled`].
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::error::{Error, Result};
 
-/// A request to stop, which another thread may make at any time; by default nobody can.
+/// A request to stop, which another thread may make at any time; by default there is none.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Cancel<'a>(Option<&'a AtomicBool>);
 
 impl<'a> Cancel<'a> {
-    /// The flag that requests it, if there is one.
+    /// The flag of the request; `None` if the computation cannot be cancelled.
     pub fn flag(self) -> Option<&'a AtomicBool> {
         self.0
     }
 }
 
 impl Cancel<'_> {
-    /// Whether the result is not wanted any more.
+    /// Whether a stop was requested.
     pub fn is_requested(self) -> bool {
         self.0.is_some_and(|flag| flag.load(Ordering::Relaxed))
     }
 
-    /// Ends a computation whose result is not wanted any more.
+    /// Returns an error if a stop was requested.
     ///
     /// # Errors
     /// [`Error::Cancelled`].

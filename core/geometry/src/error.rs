@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-/// What was wrong with the input, as one sentence that names the culprit and the fix.
+/// An input error, as one sentence that names its cause and the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A file could not be opened or read.
@@ -10,7 +10,7 @@ pub enum Error {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
     /// A file could not be written.
@@ -18,15 +18,15 @@ pub enum Error {
     Write {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
-    /// A file was read but does not make sense.
+    /// A file was read but its content is invalid.
     #[error("{path}: {problem}")]
     Format {
         /// The file.
         path: PathBuf,
-        /// What is wrong and how to mend it.
+        /// The problem and its remedy.
         problem: String,
     },
     /// A setting does not exist or its value is out of range.
@@ -34,31 +34,31 @@ pub enum Error {
     Setting {
         /// The setting's name as the user wrote it.
         key: String,
-        /// What is wrong and how to mend it.
+        /// The problem and its remedy.
         problem: String,
     },
-    /// A target cannot be designated so.
+    /// A target cannot be designated as requested.
     #[error("target: {0}")]
     Target(String),
-    /// A command names something that does not exist, or asks for what cannot be done.
+    /// A command names something that does not exist, or requests something impossible.
     #[error("{0}")]
     Request(String),
-    /// The work was cancelled by the person who asked for it.
+    /// The user cancelled the work.
     #[error("cancelled")]
     Cancelled,
 }
 
 impl Error {
-    /// A file that was read but does not make sense.
+    /// A file with invalid content.
     pub fn format(path: impl Into<PathBuf>, problem: impl Into<String>) -> Self {
         Self::Format { path: path.into(), problem: problem.into() }
     }
 
-    /// A setting that does not exist or has a bad value.
+    /// A setting that does not exist or has an invalid value.
     pub fn setting(key: impl Into<String>, problem: impl Into<String>) -> Self {
         Self::Setting { key: key.into(), problem: problem.into() }
     }
 }
 
-/// The result of anything that reads input.
+/// The result of an operation that reads input.
 pub type Result<T, E = Error> = std::result::Result<T, E>;

@@ -1,14 +1,14 @@
-//! Frames, pixels and rays: the conventions of the house, said once.
+//! The conventions of the whole project for frames, pixels and rays.
 //!
 //! | frame | axes | origin |
 //! |---|---|---|
-//! | rover | +x forward, +y right, +z down | on the axis of the middle wheels; flat ground lies near z = 0.294 m |
+//! | rover | +x forward, +y right, +z down | on the axis of the middle wheels; flat ground is near z = 0.294 m |
 //! | site | +x north, +y east, +z down | fixed; the rover's pose in it drifts with odometry |
-//! | head | the rover's axes, panned by azimuth and tilted by elevation | where the mast's pan and tilt axes meet |
+//! | head | the rover's axes, panned by azimuth and tilted by elevation | intersection of the mast's pan and tilt axes |
 //!
-//! A pose is named `a_from_b` and takes points of frame b into frame a; products are written so that the
-//! names touch: `site_from_camera = site_from_rover * rover_from_camera`. Quaternions in files are scalar
-//! first (PDS labels, domain.md 1.4) and rotate vectors of the moving frame into the reference frame.
+//! A pose is named `a_from_b` and maps points of frame b to frame a; products are written so that the names touch:
+//! `site_from_camera = site_from_rover * rover_from_camera`. Quaternions in files are scalar first (PDS labels,
+//! domain.md 1.4) and rotate vectors of the moving frame into the reference frame.
 //!
 //! Pixels: x is the column to the right, y the row down; (0, 0) is the *centre* of the first pixel, so an
 //! image of W × H spans [−0.5, W − 0.5] × [−0.5, H − 0.5] (domain.md 1.1).
@@ -54,7 +54,7 @@ impl Pixel {
         Self::new(self.x + dx, self.y + dy)
     }
 
-    /// Whether the pixel lies on an image of `width` × `height`, its border pixels included.
+    /// Whether the pixel is in an image of `width` × `height`, its border pixels included.
     #[inline]
     pub fn is_inside(self, width: u32, height: u32) -> bool {
         self.x >= -0.5
@@ -67,7 +67,7 @@ impl Pixel {
 /// A half-line in space: origin in metres and unit direction, both in the frame of the camera model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// Where the ray starts, m. For CAHVORE it moves with the pixel (the entrance pupil shifts).
+    /// Origin of the ray, m. For CAHVORE it depends on the pixel (the entrance pupil moves).
     pub origin: Point3,
     /// Unit direction.
     pub direction: Vector3,
@@ -81,10 +81,10 @@ impl Ray {
     }
 }
 
-/// The largest coordinate of a pose that is read, m: beyond any planet, and small enough to print.
+/// Largest accepted coordinate of a pose, m: beyond any planet, and small enough to print.
 pub const POSITION_LIMIT_M: f64 = 1e9;
 
-/// A pose as files and the interface write it: origin of the moving frame and its attitude, scalar first.
+/// A pose in files and in the interface: origin of the moving frame and its attitude, scalar first.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct PoseRecord {
     /// Origin of the moving frame in the reference frame, m.
@@ -94,7 +94,7 @@ pub struct PoseRecord {
 }
 
 impl PoseRecord {
-    /// The pose without motion.
+    /// The identity.
     pub const IDENTITY: Self = Self { position_m: [0.0; 3], quaternion_sxyz: [1.0, 0.0, 0.0, 0.0] };
 
     /// The rigid motion `reference_from_moving`; the quaternion is normalised first.

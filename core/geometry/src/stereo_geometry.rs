@@ -3,13 +3,13 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// How the two images of a stop relate, which decides how `point_stereo` searches.
+/// The relation of the two images of a stop, which determines the search of `point_stereo`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum StereoGeometry {
-    /// Two eyes side by side: the search interval is one of disparity (R74, R75).
+    /// Two cameras side by side: the search interval is one of disparity (R74, R75).
     #[default]
     Lateral,
-    /// Two freely placed views: the search walks the epipolar curve by range.
+    /// Two freely placed views: the search follows the epipolar curve by range.
     Convergent,
 }

@@ -15,17 +15,17 @@ use sightline_vision::image::patch::Patch;
 pub enum ArrayKind {
     /// Grey values of an image window.
     Patch,
-    /// Signed differences: zero is the middle of the colours.
+    /// Signed differences; zero is the centre of the colour scale.
     Difference,
-    /// Scores of positions.
+    /// Similarity scores of candidate positions: large is good.
     ScoreMap,
-    /// Residuals of positions: small is good.
+    /// Residuals of candidate positions: small is good.
     CostMap,
     /// Depths, ranges or disparities of an image's pixels.
     DepthMap,
-    /// Facets: x, y, z of three corners a row.
+    /// Triangles; each row has x, y and z of the three corners.
     Mesh,
-    /// Rows of numbers with columns of their own.
+    /// Rows of numbers; each column has its own unit.
     Table,
 }
 
@@ -35,7 +35,7 @@ impl ArrayKind {
         !matches!(self, Self::Mesh | Self::Table)
     }
 
-    /// Whether its values have a sign that the colours show.
+    /// Whether the values are signed, so that a diverging colour scale is needed.
     pub const fn is_signed(self) -> bool {
         matches!(self, Self::Difference)
     }
@@ -77,7 +77,7 @@ impl<'a> ArrayView<'a> {
         self.values
     }
 
-    /// Whether there is nothing in it.
+    /// Whether the array has no columns.
     pub const fn is_empty(&self) -> bool {
         self.columns == 0
     }

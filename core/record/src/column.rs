@@ -5,13 +5,13 @@ use super::{Kind, StageRecord, StageSchema, Unit, Value};
 /// A column of a table with a row per step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
-    /// The path of the value: `stage.quantity.component`, without the stage for quantities of the whole step.
+    /// The path of the value: `stage.quantity.component`; without the stage for quantities of the whole step.
     pub name: String,
-    /// The name in files: joined by underscores, with the unit at its end.
+    /// The name in files: the path with underscores for dots, followed by the unit.
     pub header: String,
     /// The unit.
     pub unit: Unit,
-    /// The kind of a cell; components are numbers.
+    /// The kind of a cell; a component is a number.
     pub kind: Kind,
     stage: usize,
     quantity: usize,
@@ -19,7 +19,7 @@ pub struct Column {
 }
 
 impl Column {
-    /// The columns of stages, in their order.
+    /// The columns of all quantities of the stages, in declaration order.
     pub fn all<'a>(schema: impl IntoIterator<Item = &'a StageSchema>) -> Vec<Self> {
         let mut columns = Vec::new();
         for (index, stage) in schema.into_iter().enumerate() {
@@ -43,7 +43,7 @@ impl Column {
         columns
     }
 
-    /// The cell of a step; numbers that are not finite are missing.
+    /// The value of this column at a step; non-finite numbers are [`Value::Missing`].
     pub fn cell(&self, records: &[StageRecord]) -> Value {
         let Some(value) = records.get(self.stage).and_then(|record| record.values.get(self.quantity)) else {
             return Value::Missing;

@@ -9,7 +9,7 @@ use super::{
 
 /// Evidence that declares its quantities, arrays and gates.
 pub trait Record: Sized + 'static {
-    /// Declares the record. The declaration gives the schema without any instance, and the values of one.
+    /// Declares the quantities, arrays and gates, with the functions that read them from an instance.
     fn declare(r: &mut Declaration<Self>);
 }
 
@@ -18,7 +18,7 @@ type GetArray<E> = Box<dyn for<'a> Fn(&'a E) -> Option<ArrayView<'a>> + Send + S
 type GetGates<E> = Box<dyn Fn(&E) -> Vec<GateRecord> + Send + Sync>;
 type GetReason<E> = Box<dyn Fn(&E) -> Option<String> + Send + Sync>;
 
-/// The declaration of an evidence type: its schema, and how each part is read from an instance.
+/// The declaration of an evidence type: its schema, and the functions that read each part from an instance.
 pub struct Declaration<E> {
     pub(crate) schema: StageSchema,
     pub(crate) values: Vec<Get<E>>,
@@ -39,23 +39,23 @@ impl<E> Default for Declaration<E> {
     }
 }
 
-/// A quantity that was just declared, to be described.
+/// Adds the description, label and formula of a quantity.
 pub struct Described<'a>(&'a mut Quantity);
 
 impl Described<'_> {
-    /// One sentence: the meaning, the frame, and when it is missing.
+    /// Sets the description, one sentence: the meaning, the frame, and when the value is missing.
     pub fn describe(self, description: &'static str) -> Self {
         self.0.description = description.into();
         self
     }
 
-    /// The name shown to people, where it is another than the name in words.
+    /// Sets the name shown to people; the default is derived from the name.
     pub fn label(self, label: &'static str) -> Self {
         self.0.label = label.into();
         self
     }
 
-    /// How it follows from its inputs.
+    /// Sets the formula, and the quantities and settings that it uses.
     pub fn formula(self, formula: &'static str, inputs: &[&'static str]) -> Self {
         self.0.formula = formula.into();
         self.0.inputs = inputs.iter().map(|&input| Cow::Borrowed(input)).collect();
@@ -63,11 +63,11 @@ impl Described<'_> {
     }
 }
 
-/// An array that was just declared.
+/// Adds the unit of an array.
 pub struct DescribedArray<'a>(&'a mut ArrayDecl);
 
 impl DescribedArray<'_> {
-    /// The unit of its values, where they have one.
+    /// Sets the unit of the values; the default is a pure number.
     pub fn unit(self, unit: Unit) {
         self.0.unit = unit;
     }
@@ -95,12 +95,12 @@ impl<E: 'static> Declaration<E> {
         Described(&mut self.schema.quantities[last])
     }
 
-    /// Declares the unit of a field of the evidence that is no quantity: a list, or a part of a model.
+    /// Declares the unit of a field of the evidence that is not a quantity: a list, or a part of a model.
     pub fn field(&mut self, name: impl Into<Cow<'static, str>>, unit: Unit) {
         self.schema.fields.push((name.into(), unit));
     }
 
-    /// Declares an array; an empty view counts as missing.
+    /// Declares an array; an empty view means that it is missing.
     pub fn array(
         &mut self,
         name: &'static str,
@@ -119,17 +119,17 @@ impl<E: 'static> Declaration<E> {
         DescribedArray(&mut self.schema.arrays[last])
     }
 
-    /// Declares a gate that [`Self::gates`] may give.
+    /// Declares a gate that [`Self::gates`] may return.
     pub fn gate(&mut self, name: &'static str, unit: Unit, side: Side, setting: &'static str) {
         self.schema.gates.push(GateDecl { name: name.into(), unit, side, setting: setting.into() });
     }
 
-    /// Declares where the evaluated gates are.
+    /// Sets the function that returns the evaluated gates.
     pub fn gates(&mut self, get: impl Fn(&E) -> Vec<GateRecord> + Send + Sync + 'static) {
         self.gates.push(Box::new(get));
     }
 
-    /// Declares the sentence that says why there is no result.
+    /// Sets the function that returns why the stage has no result, as one sentence.
     pub fn reason(&mut self, get: impl Fn(&E) -> Option<String> + Send + Sync + 'static) {
         self.reason = Some(Box::new(get));
     }

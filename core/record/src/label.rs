@@ -1,18 +1,19 @@
-//! Names of quantities and fields in words, and their units with the frame that the name tells.
+//! Labels of quantities and fields: their names in words, and their units with the frame that the name ends with.
 
 use super::Unit;
 
 /// The frames that a name may end with.
 const FRAMES: [&str; 2] = ["rover", "site"];
 
-/// A name in words: `second_peak.distance_px` is “second peak distance”, `position_in_rover` is “position”.
+/// The name in words, without unit and frame: `second_peak.distance_px` becomes “second peak distance”,
+/// `position_in_rover` becomes “position”.
 pub fn label(name: &str, unit: Unit) -> String {
     let (name, _) = frame(name);
     let name = name.strip_suffix(unit.word()).and_then(|rest| rest.strip_suffix('_')).unwrap_or(name);
     name.replace(['_', '.'], " ")
 }
 
-/// The unit's symbol, and the frame of a name that has one: `m, rover`.
+/// The unit's symbol, followed by the frame if the name ends with one: `m, rover`.
 pub fn unit_label(name: &str, unit: Unit) -> String {
     match (unit.symbol(), frame(name).1) {
         (symbol, None) => symbol.to_owned(),

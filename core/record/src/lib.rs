@@ -4,8 +4,8 @@
 //! impl Record for Evidence ──► Stage<Step> ──► StageSchema   names, units, formulas     once per run
 //!                                         └──► StageRecord   plain values               once per step
 //! ```
-//! Tables, comparisons, expressions, plots, explanations, logs and pages are views of the two. A record that comes from
-//! elsewhere (a tracker that sends its schema) is displayed like one of ours, because a view knows no evidence type.
+//! Tables, comparisons, expressions, plots, explanations, logs and pages are views of schemas and records. They do not
+//! depend on evidence types, so records of an external tracker that sends its schema are displayed in the same way.
 //!
 //! ```
 //! use sightline_record::{Declaration, Record, Stage, Unit};

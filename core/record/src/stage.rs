@@ -1,4 +1,4 @@
-//! A stage of a step: a declaration with the way from the step to its evidence.
+//! A stage of a step: declarations of evidence types, with functions that get the evidence from the step.
 
 use std::borrow::Cow;
 
@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::{ArrayView, Declaration, Record, StageRecord, StageSchema, Value};
 
-/// A stage of the step type `S`, whatever its evidence types are.
+/// A stage of the step type `S`; the evidence types are erased.
 pub struct Stage<S> {
     schema: StageSchema,
     parts: Vec<Part<S>>,
@@ -16,14 +16,14 @@ pub struct Stage<S> {
 /// Serialises the evidence of a step.
 type Evidence<S> = Box<dyn Fn(&S) -> Option<serde_json::Value> + Send + Sync>;
 
-/// A declaration of the stage, with the positions of its first quantity and array in the schema.
+/// One declaration of the stage, with the indices of its first quantity and array in the schema.
 struct Part<S> {
     first_quantity: usize,
     first_array: usize,
     reader: Box<dyn Read<S> + Send + Sync>,
 }
 
-/// The part of a stage that knows an evidence type.
+/// Reads one declaration from a step of type `S`; erases the evidence type.
 trait Read<S> {
     fn is_reached(&self, step: &S) -> bool;
     fn value(&self, step: &S, index: usize) -> Option<Value>;
@@ -31,7 +31,7 @@ trait Read<S> {
     fn record(&self, step: Option<&S>) -> StageRecord;
 }
 
-/// Evidence that the step contains.
+/// Evidence that is a part of the step.
 struct Borrowed<S, E> {
     find: for<'a> fn(&'a S) -> Option<&'a E>,
     declaration: Declaration<E>,
@@ -43,7 +43,7 @@ struct Computed<S, E> {
     declaration: Declaration<E>,
 }
 
-/// Evidence of something that the step contains.
+/// Evidence of a step of type `S` that is a part of a `T`.
 struct Within<T, S> {
     find: for<'a> fn(&'a T) -> Option<&'a S>,
     reader: Box<dyn Read<S> + Send + Sync>,
@@ -69,7 +69,7 @@ impl<S: 'static> Stage<S> {
         stage
     }
 
-    /// The same stage with what else declares something for it: evidence that is stored elsewhere in the step.
+    /// Adds a declaration of evidence that is stored elsewhere in the step.
     #[must_use]
     pub fn with<E: 'static>(
         mut self,
@@ -82,7 +82,7 @@ impl<S: 'static> Stage<S> {
         self
     }
 
-    /// The same stage with the path of its evidence in the serialised step, or a further one in steps of another tracker.
+    /// Sets the path of its evidence in the serialised step; a second call adds a path for the steps of another tracker.
     #[must_use]
     pub fn at(mut self, path: impl Into<Cow<'static, str>>) -> Self {
         if self.schema.path.is_empty() {
@@ -93,13 +93,13 @@ impl<S: 'static> Stage<S> {
         self
     }
 
-    /// A stage whose evidence follows by [`Self::with`].
+    /// A stage without declarations; [`Self::with`] adds them.
     pub fn of_parts(name: &'static str, question: &'static str) -> Self {
         let schema = StageSchema { stage: name.into(), question: question.into(), ..StageSchema::default() };
         Self { schema, parts: Vec::new(), evidence: None }
     }
 
-    /// The same stage of a type that contains `S`, at one of the paths `at`; an empty path means that it is not nested.
+    /// The same stage for a type `T` that contains `S` at one of the paths `at`; an empty path means that it is not nested.
     #[must_use]
     pub fn within<T: 'static>(
         self,
@@ -139,29 +139,29 @@ impl<S: 'static> Stage<S> {
         &self.schema
     }
 
-    /// Whether the step reached the stage: whether its first evidence exists.
+    /// Whether the step reached the stage, which means that the evidence of its first declaration exists.
     pub fn is_reached(&self, step: &S) -> bool {
         self.parts.first().is_some_and(|part| part.reader.is_reached(step))
     }
 
-    /// The value of the quantity at `index` of the schema; missing where the stage was not reached.
+    /// The value of the quantity at `index` of the schema; missing if the stage was not reached.
     pub fn value(&self, step: &S, index: usize) -> Value {
         let part = self.parts.iter().rev().find(|part| part.first_quantity <= index);
         part.and_then(|part| part.reader.value(step, index - part.first_quantity)).unwrap_or_default()
     }
 
-    /// The value of the quantity of a name; `None` where the stage declares no such quantity.
+    /// The value of the quantity with this name; `None` if the stage declares no such quantity.
     pub fn value_of(&self, step: &S, name: &str) -> Option<Value> {
         let index = self.schema.quantities.iter().position(|quantity| quantity.name == name)?;
         Some(self.value(step, index))
     }
 
-    /// The serialised evidence of a step, arrays left out; `None` where the stage was not reached or has none of its own.
+    /// The serialised evidence of a step, without arrays; `None` if the stage was not reached or has no evidence of its own.
     pub fn evidence(&self, step: &S) -> Option<serde_json::Value> {
         self.evidence.as_ref()?(step)
     }
 
-    /// The array of a name.
+    /// The array with this name; `None` if it is not declared or does not exist at this step.
     pub fn array<'a>(&self, step: &'a S, name: &str) -> Option<ArrayView<'a>> {
         let index = self.schema.arrays.iter().position(|array| array.name == name)?;
         let part = self.parts.iter().rev().find(|part| part.first_array <= index)?;
@@ -262,7 +262,7 @@ impl<T: 'static, S: 'static> Read<T> for Within<T, S> {
     }
 }
 
-/// A path below another.
+/// Joins two paths, either of which may be empty.
 fn joined(at: &str, path: &str) -> String {
     match (at, path) {
         ("", path) => path.to_owned(),

@@ -36,7 +36,7 @@ pub enum Unit {
     MetrePerPixel,
 }
 
-/// Unit, symbol, word, exponents of (m, px, rad, s), and how many of it make one base unit.
+/// Unit, symbol, word, exponents of (m, px, rad, s), and the number of these units in one base unit.
 type Row = (Unit, &'static str, &'static str, [i8; 4], f64);
 
 const TABLE: [Row; 13] = [
@@ -66,7 +66,7 @@ impl Unit {
         self.row().1
     }
 
-    /// The ASCII word that files and expressions write: `deg`, `px2`, `1`.
+    /// The ASCII word used in files and expressions: `deg`, `px2`, `1`.
     pub fn word(self) -> &'static str {
         self.row().2
     }
@@ -76,7 +76,7 @@ impl Unit {
         self.row().3
     }
 
-    /// How many of this unit make one base unit (m, px, rad, s).
+    /// The number of these units in one base unit (m, px, rad, s): 100 for cm.
     pub fn per_base(self) -> f64 {
         self.row().4
     }
@@ -86,12 +86,12 @@ impl Unit {
         !matches!(self, Self::One | Self::SquareMetre | Self::SquarePixel | Self::MetrePerPixel)
     }
 
-    /// The unit of a word or symbol.
+    /// Finds a unit by its word or symbol.
     pub fn from_word(text: &str) -> Option<Self> {
         TABLE.into_iter().find(|row| row.2 == text || row.1 == text).map(|(unit, ..)| unit)
     }
 
-    /// The unit that a field's name tells by the naming rules: at its end (`sigma_m`, `covariance_px2`), or by its frame
+    /// The unit of a field by the naming rules: from the suffix (`sigma_m`, `covariance_px2`), or from the frame
     /// (`position_in_rover`, `covariance_in_site`).
     pub fn of_name(name: &str) -> Option<Self> {
         if name.contains("covariance_in_") {
@@ -105,7 +105,7 @@ impl Unit {
     }
 
     fn row(self) -> Row {
-        // The table has the units in the order of the enum; a test compares them.
+        // The rows of the table are in the order of the enum; a test compares them.
         TABLE[self as usize]
     }
 }

@@ -2,7 +2,7 @@
 
 use super::ArrayView;
 
-/// A value that only the process which computed the record has; absent in a record that was read from JSON.
+/// A value that exists only in the process that computed the record; absent in a record that was read from JSON.
 ///
 /// A field of this type is marked `#[serde(skip)]`. Every reader gets an `Option`, so that an array which was not sent
 /// cannot be taken for an empty one.
@@ -10,12 +10,12 @@ use super::ArrayView;
 pub struct Unsent<T>(Option<T>);
 
 impl<T> Unsent<T> {
-    /// The value; `None` in a record that was read from JSON, and if it was not computed.
+    /// The value; `None` if the record was read from JSON, or the value was not computed.
     pub const fn get(&self) -> Option<&T> {
         self.0.as_ref()
     }
 
-    /// The view of an array; an empty one, which counts as missing, if the array is absent.
+    /// The view of an array; empty, which means missing, if the array is absent.
     pub fn view<'a>(&'a self) -> ArrayView<'a>
     where
         &'a T: Into<ArrayView<'a>>,
@@ -25,7 +25,7 @@ impl<T> Unsent<T> {
 }
 
 impl<T: Default> Unsent<T> {
-    /// The value to be changed; the default if it was not computed yet.
+    /// A mutable reference to the value; inserts the default if it is absent.
     pub fn get_or_default(&mut self) -> &mut T {
         self.0.get_or_insert_default()
     }

@@ -1,4 +1,4 @@
-//! Plain values of quantities, and the types of evidence that convert to them.
+//! Plain values of quantities, and the evidence types that convert to them.
 
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2};
 use serde::{Deserialize, Serialize};
@@ -18,7 +18,7 @@ pub enum Kind {
     Flag,
     /// A word or a sentence.
     Word,
-    /// Column and row in an image.
+    /// Column (x) and row (y) in an image.
     Pixel,
     /// x, y and z.
     Vector,
@@ -31,7 +31,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// The names of the components; none for a value that has no parts.
+    /// The names of the components; empty for scalars and words.
     pub const fn components(self) -> &'static [&'static str] {
         match self {
             Self::Number | Self::Count | Self::Flag | Self::Word => &[],
@@ -64,7 +64,7 @@ pub enum Value {
 }
 
 impl Value {
-    /// The value as a number: counts and flags convert (true is 1).
+    /// The value as a number; counts and flags convert (true is 1). `None` for other kinds.
     pub fn number(&self) -> Option<f64> {
         match self {
             Self::Number(number) => Some(*number),
@@ -82,7 +82,7 @@ impl Value {
         }
     }
 
-    /// The word, where it is one.
+    /// The word; `None` for other kinds.
     pub fn word(&self) -> Option<&str> {
         match self {
             Self::Word(word) => Some(word),
@@ -91,7 +91,7 @@ impl Value {
     }
 }
 
-/// A type that a quantity may have in the evidence.
+/// A type of evidence field that can be declared as a quantity.
 pub trait Measured {
     /// The kind of its values.
     const KIND: Kind;

@@ -1,7 +1,7 @@
-//! Whether an index makes sense, and its cameras resolved.
+//! Checks an index and resolves its cameras.
 //!
-//! Each problem is one sentence that begins with the field (`stops[3].left.camera: …`). What a person
-//! should know but can work with becomes a warning.
+//! Each problem is one sentence that begins with the field (`stops[3].left.camera: …`). A problem that does not
+//! prevent the use of the index is a warning.
 
 use std::path::Path;
 
@@ -22,13 +22,13 @@ const CAMERA_FILE_LIMIT: u64 = 1 << 20;
 
 /// A motion between two stops is a jump beyond this length, m, if it is also [`FEW_TIMES`] as long as the median.
 const JUMP_M: f64 = 20.0;
-/// See [`JUMP_M`]: recordings of cars have long steps everywhere.
+/// See [`JUMP_M`]: recordings of cars have long steps throughout.
 const FEW_TIMES: f64 = 3.0;
 /// A motion between two stops is a jump beyond this multiple of the median, unless it is shorter than [`SHORT_M`].
 const MANY_TIMES: f64 = 20.0;
 /// The shortest jump, m: a rover that turns in place has a median near zero.
 const SHORT_M: f64 = 1.0;
-/// How many jumps are named one by one.
+/// Number of jumps that are named individually.
 const JUMPS_NAMED: usize = 5;
 
 /// The cameras of one stop, in the rover frame, with O made unit.
@@ -54,12 +54,12 @@ pub(super) struct FurtherCameras {
 }
 
 impl FurtherCameras {
-    /// The true left camera; the given one where no truth is recorded.
+    /// The true left camera; the given one if no truth is recorded.
     pub(super) fn true_left(&self) -> &Camera {
         self.true_left.as_ref().unwrap_or(&self.left)
     }
 
-    /// The true right camera; the given one where no truth is recorded, `None` for a single camera.
+    /// The true right camera; the given one if no truth is recorded, `None` for a single camera.
     pub(super) fn true_right(&self) -> Option<&Camera> {
         let given = self.right.as_ref()?;
         Some(self.true_right.as_ref().unwrap_or(given))
@@ -67,12 +67,12 @@ impl FurtherCameras {
 }
 
 impl StopCameras {
-    /// The true camera of the left image; the given one where no truth is recorded.
+    /// The true camera of the left image; the given one if no truth is recorded.
     pub(super) fn true_left(&self) -> &Camera {
         self.true_left.as_ref().unwrap_or(&self.left)
     }
 
-    /// The true camera of the right image; the given one where no truth is recorded.
+    /// The true camera of the right image; the given one if no truth is recorded.
     pub(super) fn true_right(&self) -> &Camera {
         self.true_right.as_ref().unwrap_or(&self.right)
     }
@@ -83,7 +83,7 @@ impl StopCameras {
     }
 }
 
-/// Checks the parts of an index that do not belong to one stop.
+/// Checks the fields of an index outside its stops.
 pub(super) fn check_index(index: &TraverseIndex) -> Result<(), String> {
     if index.format != FORMAT_VERSION {
         let version = index.format;
@@ -278,7 +278,7 @@ fn jumps(index: &TraverseIndex) -> Vec<String> {
         others_m.map_or_else(String::new, |others_m| format!("; a typical step is {others_m:.2} m"));
     let named = found.iter().take(JUMPS_NAMED).map(|(step, motion_m)| {
         let stop = step + 1;
-        // Scientific notation where the digits of an absurd number would fill the line.
+        // Scientific notation if the digits of an absurd number would fill the line.
         let motion = if **motion_m < 1e7 { format!("{motion_m:.1}") } else { format!("{motion_m:.1e}") };
         format!("stops[{stop}].site_from_rover: is {motion} m from the stop before{typical}: check the poses")
     });
@@ -289,7 +289,7 @@ fn jumps(index: &TraverseIndex) -> Vec<String> {
     sentences
 }
 
-/// What a person should know about an index that can be used nevertheless.
+/// Returns warnings about an index that can be used nevertheless.
 pub(super) fn warnings(index: &TraverseIndex, folder: &Path) -> Vec<String> {
     let mut warnings = Vec::new();
     for (step, pair) in index.stops.windows(2).enumerate() {

@@ -1,4 +1,4 @@
-//! Tests of the checks of an index of stops: jumps of the pose and the rover that stands still.
+//! Tests of the checks of an index of stops: jumps of the pose, and a rover that does not move.
 
 use super::*;
 use crate::IndexFormat;

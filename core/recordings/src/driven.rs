@@ -1,12 +1,12 @@
-//! A traverse that is driven: a folder whose stops are added one by one as the rover is commanded.
+//! A driven traverse: a folder whose stops are added one by one as the rover is commanded.
 //!
-//! The folder is an ordinary simulated traverse, which can be opened and replayed at any time. `driven.json` beside the index
-//! is the state of the world ([`DrivenStop`] for each stop): [`DrivenTraverse::resume`] continues from it with the same bits.
-//! The decisions that were followed are kept beside it (`followed`).
+//! The folder is an ordinary simulated traverse, which can be opened and replayed at any time. `driven.json` beside
+//! the index is the state of the world ([`DrivenStop`] for each stop): [`DrivenTraverse::resume`] continues from it
+//! with the same bits. The decisions that were followed are stored beside it (`followed`).
 //!
 //! ```text
 //! scenario.toml   the world            traverse.toml   the stops driven to
-//! driven.json     the world's state    images/         rendered when first asked for
+//! driven.json     the world's state    images/         rendered on first use
 //! decisions.json  the decisions that the rover followed
 //! ```
 
@@ -34,7 +34,7 @@ use crate::native::{Traverse, write};
 /// The name of the file with the world's state.
 const STATE_FILE: &str = "driven.json";
 
-/// A traverse that is driven.
+/// A driven traverse.
 pub struct DrivenTraverse {
     traverse: Traverse,
     scenario: Scenario,
@@ -43,16 +43,16 @@ pub struct DrivenTraverse {
 }
 
 impl DrivenTraverse {
-    /// Makes the folder of a drive with its first stop, the mast pointed at the targets' centre.
+    /// Creates the folder of a drive with its first stop, the mast pointed at the targets' centre.
     ///
     /// # Errors
-    /// A scenario that no world can be made of, a folder that holds something already or cannot be written, or [`Error::Cancelled`].
+    /// An invalid scenario, a folder that is not empty or cannot be written, or [`Error::Cancelled`].
     pub fn begin(scenario: &Scenario, folder: &Path, cancel: Cancel<'_>) -> Result<Self> {
         Self::check(scenario, folder)?;
         Self::begin_in(World::new_until(scenario, cancel)?, scenario, folder, cancel)
     }
 
-    /// Refuses what no drive can be begun with.
+    /// Checks that a drive can begin with this scenario in this folder.
     fn check(scenario: &Scenario, folder: &Path) -> Result<()> {
         scenario.validate()?;
         let is_empty = std::fs::read_dir(folder).map_or(true, |mut entries| entries.next().is_none());
@@ -80,7 +80,7 @@ impl DrivenTraverse {
         Ok(driven)
     }
 
-    /// Makes the folder of a drive in a world that has this state already, from its first stops on.
+    /// Creates the folder of a drive in a world that already has this state, including its first stops.
     ///
     /// # Errors
     /// As [`Self::begin`], and a state without a stop.
@@ -95,12 +95,12 @@ impl DrivenTraverse {
         Ok(driven)
     }
 
-    /// Makes another drive of the same world that shares the first `count` stops and goes its own way from there, with `faults`
-    /// injected at later ones.
+    /// Creates another drive of the same world that shares the first `count` stops and continues independently, with
+    /// `faults` injected at later ones.
     ///
     /// # Errors
-    /// A count of none or of more stops than there are, a fault at one of them, or a folder that holds something already or cannot be
-    /// written.
+    /// A count of 0 or above the number of stops, a fault at a shared stop, or a folder that is not empty or cannot
+    /// be written.
     pub fn branch(&self, count: usize, faults: &[Fault], folder: &Path, cancel: Cancel<'_>) -> Result<Self> {
         if count == 0 || count > self.driven.len() {
             let problem =
@@ -135,7 +135,7 @@ impl DrivenTraverse {
     /// Opens the folder of a drive to continue it from its last stop.
     ///
     /// # Errors
-    /// A folder without a drive, or one whose state does not fit its index.
+    /// A folder without a drive, or with a state that does not match its index.
     pub fn resume(folder: &Path) -> Result<Self> {
         let traverse = Traverse::open(folder)?;
         let path = folder.join(STATE_FILE);
@@ -155,7 +155,7 @@ impl DrivenTraverse {
         Ok(resumed)
     }
 
-    /// The faults that were injected.
+    /// The injected faults.
     pub fn faults(&self) -> &[Fault] {
         &self.scenario.events.faults
     }
@@ -165,17 +165,17 @@ impl DrivenTraverse {
         &self.traverse
     }
 
-    /// The state of the world: all of it.
+    /// The complete state of the world.
     pub fn state(&self) -> &[DrivenStop] {
         &self.driven
     }
 
-    /// Puts the world into a state that it, or another with the same scenario, had.
+    /// Sets the world to a state that it, or another one with the same scenario, had.
     ///
     /// # Errors
     /// A state without a stop, or files that cannot be written.
     pub fn restore(&mut self, state: Vec<DrivenStop>) -> Result<()> {
-        // A decision is kept where the drive that it led to is the same; images taken and pointings at the stop may differ.
+        // A decision is kept if the drive that followed it is the same; images taken and pointings at the stop may differ.
         let is_driven_alike = |(one, other): &(&DrivenStop, &DrivenStop)| {
             one.time_s == other.time_s && one.true_site_from_rover == other.true_site_from_rover
         };
@@ -202,17 +202,17 @@ impl DrivenTraverse {
         self.save()
     }
 
-    /// What the rover reports of the drive to a stop; `None` at the first stop and where there is none.
+    /// The rover's report of the drive to a stop; `None` at the first stop, or without such a stop.
     pub fn report(&self, number: usize) -> Option<DriveReport> {
         self.driven.get(number).filter(|_| number > 0).map(report)
     }
 
-    /// The decision at a stop that was followed to the next one; `None` at the last stop and where none is known.
+    /// The decision at a stop that was followed to the next one; `None` at the last stop, or if unknown.
     pub fn followed(&self, number: usize) -> Option<&Followed> {
         self.decisions.at(number)
     }
 
-    /// The stops so far as a traverse of its own, which later stops do not change.
+    /// The stops so far as a separate traverse, which later stops do not change.
     ///
     /// # Errors
     /// An index that cannot be read.
@@ -222,7 +222,7 @@ impl DrivenTraverse {
         Ok(copy)
     }
 
-    /// The same with the images of the last stop, also where they are put off: vision measures the motion in them first.
+    /// As [`Self::snapshot`], with the images of the last stop even if put off: vision measures the motion in them first.
     ///
     /// # Errors
     /// As [`Self::snapshot`].
@@ -247,7 +247,7 @@ impl DrivenTraverse {
         if before == stage { Ok(()) } else { self.save() }
     }
 
-    /// Collisions so far: steps that a rock ended, and stops at which a rock reaches into the rover's body.
+    /// Collisions so far: motions ended by a rock, and stops at which a rock reaches into the rover's body.
     pub fn collisions(&self) -> u32 {
         self.driven
             .iter()
@@ -255,8 +255,8 @@ impl DrivenTraverse {
             .sum()
     }
 
-    /// Removes the images of the stops from `count` on, of all cameras or those of visual odometry's own pair, or those of the
-    /// others: they will show something else.
+    /// Removes the images of the stops from `count` on, because their content will change: those of all cameras, of
+    /// visual odometry's own pair, or of the others.
     fn forget_images(&self, count: usize, which: impl Fn(bool) -> bool) -> Result<()> {
         for stop in self.traverse.index().stops.iter().skip(count) {
             let own = stop.camera(CameraName::ODOMETRY);
@@ -298,7 +298,7 @@ fn no_simulation() -> Error {
     Error::Request("a recorded drive cannot be driven".to_owned())
 }
 
-/// What the rover reports of the drive to a stop.
+/// The rover's report of the drive to a stop.
 fn report(stop: &DrivenStop) -> DriveReport {
     DriveReport {
         wheels_m: stop.wheels_m,

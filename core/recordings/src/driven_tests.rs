@@ -1,4 +1,4 @@
-//! Drives on commands in folders: resumed, restored, branched and refused.
+//! Commanded drives in folders: resumed, restored, branched and rejected.
 
 use sightline_world::surface_point;
 
@@ -78,7 +78,7 @@ fn wheels_leave_tracks_where_the_rover_was_driven() {
         for motion in [arc(0.8), Motion::Turn { angle_rad: 1.0 }, arc(1.2)] {
             world.drive(&motion, Cancel::default()).unwrap();
         }
-        // Back to where it came from.
+        // Look back along the tracks.
         let angles = MastAngles { azimuth_rad: 3.0, elevation_rad: -0.6 };
         world.point_mast(Some(angles)).unwrap();
         world
@@ -100,11 +100,11 @@ fn wheels_leave_tracks_where_the_rover_was_driven() {
         let point = surface_point(world, &camera, Pixel::new(f64::from(x), f64::from(y))).unwrap();
         let off = |place: &[f64; 2]| (place[0] - point.x).hypot(place[1] - point.y);
         let nearest_m = places.iter().map(off).fold(f64::INFINITY, f64::min);
-        // Half the width, half a piece of the way and half a pixel.
+        // Half the track's width, half a segment of it and half a pixel.
         assert!(nearest_m < 0.08 + 0.05 + 0.03, "({x}, {y}): {nearest_m} m from the wheels' way");
     }
     assert!(changed > 300, "{changed} of {} pixels", 128 * 128);
-    // The folder alone renders the same tracks, and a resumed drive goes on with them.
+    // The folder alone renders the same tracks, and a resumed drive continues them.
     let seen = tracked.traverse().capture(2).unwrap();
     std::fs::remove_dir_all(folder.path().join("tracked/images")).unwrap();
     std::fs::remove_dir_all(folder.path().join("tracked/cache")).unwrap();

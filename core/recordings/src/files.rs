@@ -1,6 +1,6 @@
 //! Names inside a traverse's folder, and files that appear complete or not at all.
 //!
-//! An index may come from anyone, so a name in it must stay inside the folder: relative, without `..`,
+//! An index may come from an untrusted source, so a name in it must stay inside the folder: relative, without `..`,
 //! and without a symbolic link that leads out.
 
 use std::fs::File;
@@ -11,13 +11,13 @@ use sightline_geometry::error::{Error, Result};
 use sightline_vision::image::io::open_regular;
 use tempfile::NamedTempFile;
 
-/// How the names of temporary files end.
+/// Suffix of the names of temporary files.
 pub const PARTIAL: &str = ".partial";
 
-/// The path of `name` inside `folder`; the file need not exist.
+/// Returns the path of `name` inside `folder`; the file need not exist.
 ///
 /// # Errors
-/// A sentence without the file's name: what is wrong with the name.
+/// The problem of the name, as a sentence without it.
 pub(super) fn resolve(folder: &Path, name: &str) -> Result<PathBuf, String> {
     if name.trim().is_empty() {
         return Err("the file name is empty".to_owned());
@@ -29,7 +29,7 @@ pub(super) fn resolve(folder: &Path, name: &str) -> Result<PathBuf, String> {
     }
     let path = folder.join(relative);
     let root = folder.canonicalize().map_err(|error| format!("the folder cannot be read ({error})"))?;
-    // A missing file has no real path yet; the nearest folder that exists decides where it would lie.
+    // A missing file has no real path yet; its nearest existing ancestor is checked instead.
     let real = path.ancestors().find_map(|part| match part.symlink_metadata() {
         Ok(_) => Some(part.canonicalize()),
         Err(_) => None,
@@ -50,7 +50,7 @@ pub(super) fn open(path: &Path) -> Result<File> {
     open_regular(path).map_err(|source| Error::Read { path: path.to_owned(), source })
 }
 
-/// The text of a regular file.
+/// Reads the text of a regular file.
 ///
 /// # Errors
 /// As [`open_regular`], or a file that is not UTF-8.
@@ -60,7 +60,7 @@ pub(super) fn read_text(path: &Path) -> std::io::Result<String> {
     Ok(text)
 }
 
-/// Writes `bytes` under a temporary name and renames it, so that nobody ever sees half a file.
+/// Writes `bytes` under a temporary name and renames it, so that a partial file is never visible.
 ///
 /// # Errors
 /// [`Error::Write`] naming `path`; nothing is left behind.
@@ -72,8 +72,8 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     file.replace()
 }
 
-/// A file in work, beside its place under a temporary name: it gets its own name when it is complete and on disk. Dropped
-/// before, it is removed; what a killed program leaves is locked by nobody, and [`remove_left_overs`] removes it.
+/// An unfinished file under a temporary name beside its path: it gets its own name once it is complete and on disk.
+/// If dropped before, it is removed. A file left by a killed program is not locked, and [`remove_left_overs`] removes it.
 #[derive(Debug)]
 pub struct PartialFile {
     file: NamedTempFile,
@@ -81,7 +81,7 @@ pub struct PartialFile {
 }
 
 impl PartialFile {
-    /// Begins the file `path`, whose folder exists.
+    /// Creates the temporary file of `path`, whose folder exists.
     ///
     /// # Errors
     /// [`Error::Write`] naming `path`.
@@ -89,7 +89,7 @@ impl PartialFile {
         let prefix = format!(".{}.", path.file_name().unwrap_or_default().to_string_lossy());
         let mut builder = tempfile::Builder::new();
         builder.prefix(&prefix).suffix(PARTIAL);
-        // As any new file: the umask decides who may read it.
+        // As for any new file, the umask decides who may read it.
         #[cfg(unix)]
         let mode = std::os::unix::fs::PermissionsExt::from_mode(0o666);
         #[cfg(unix)]
@@ -97,12 +97,12 @@ impl PartialFile {
         let file = builder
             .tempfile_in(folder_of(path))
             .map_err(|source| Error::Write { path: path.to_owned(), source })?;
-        // Where a file system has no locks, what a killed program leaves stays.
+        // On a file system without locks, the files of killed programs remain.
         let _ = file.as_file().try_lock();
         Ok(Self { file, path: path.to_owned() })
     }
 
-    /// Completes the file, in place of one that has its name.
+    /// Completes the file, replacing an existing one.
     ///
     /// # Errors
     /// [`Error::Write`]; nothing is left behind.
@@ -110,10 +110,10 @@ impl PartialFile {
         self.complete(|file, path| file.persist(path).map(|_| ()).map_err(|failed| failed.error))
     }
 
-    /// Completes the file, never over another one.
+    /// Completes the file, never replacing an existing one.
     ///
     /// # Errors
-    /// [`Error::Write`] also when a file of its name exists; nothing of this one is left behind.
+    /// [`Error::Write`], also if a file of its name exists; nothing of this one is left behind.
     pub fn complete_new(self) -> Result<()> {
         self.complete(|file, path| file.persist_noclobber(path).map(|_| ()).map_err(|failed| failed.error))
     }
@@ -135,14 +135,14 @@ impl Write for PartialFile {
     }
 }
 
-/// Puts the names in a folder on disk, which the file itself does not: without it a new file may be gone after a power loss.
+/// Writes the entries of a folder to disk, as syncing a file does not: otherwise a new file may be lost in a power failure.
 ///
 /// # Errors
 /// Those of the system.
 pub fn sync_folder(folder: &Path) -> std::io::Result<()> {
     #[cfg(unix)]
     match File::open(folder).and_then(|opened| opened.sync_all()) {
-        // Some file systems cannot do it, and a folder that may be written need not be readable.
+        // Some file systems do not support it, and a writable folder need not be readable.
         Err(error)
             if !matches!(
                 error.kind(),
@@ -160,8 +160,8 @@ pub fn sync_folder(folder: &Path) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Removes the temporary files that killed programs left in a folder, those of the file `name` alone if there is one; a
-/// file that is being written is locked and stays.
+/// Removes the temporary files that killed programs left in a folder, or only those of the file `name`; a file that
+/// is being written is locked and stays.
 pub fn remove_left_overs(folder: &Path, name: Option<&str>) {
     for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
         let own = entry.file_name().to_string_lossy().into_owned();
@@ -170,7 +170,7 @@ pub fn remove_left_overs(folder: &Path, name: Option<&str>) {
             continue;
         }
         if File::open(entry.path()).is_ok_and(|file| file.try_lock().is_ok()) {
-            // One that cannot be removed does no harm.
+            // A file that cannot be removed does no harm.
             let _ = std::fs::remove_file(entry.path());
         }
     }
@@ -182,7 +182,7 @@ pub fn remove_left_overs_of(path: &Path) {
     remove_left_overs(folder_of(path), Some(&name));
 }
 
-/// The name of the file that this one, without the dot in front, is the temporary form of: `NAME.X.partial`, in earlier
+/// The final name of a temporary file, given without its leading dot: `NAME.X.partial`, in folders of earlier
 /// versions also `NAME.NUMBER.part`.
 fn temporary_of(name: &str) -> Option<&str> {
     if let Some(rest) = name.strip_suffix(PARTIAL) {

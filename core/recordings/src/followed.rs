@@ -1,7 +1,7 @@
 //! The decisions that a driven rover followed, in `decisions.json` beside the world's state.
 //!
-//! Decisions can be made again at any time, but under another command they would be others. What the rover really did is kept:
-//! the decision at stop k is there as soon as stop k + 1 is. In a folder without the file no decision is known.
+//! Decisions can be computed again at any time, but another command would change them. The rover's actual decisions
+//! are stored: the decision at stop k exists as soon as stop k + 1 does. In a folder without the file no decision is known.
 //!
 //! Source: papers.md R94.
 
@@ -17,7 +17,7 @@ use crate::files::{read_text, write_atomically};
 /// The name of the file.
 const FILE: &str = "decisions.json";
 
-/// A decision that was followed, as it is stored.
+/// A followed decision, as it is stored.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Followed {
     /// The target on whose estimates the rover moved.
@@ -28,15 +28,15 @@ pub struct Followed {
     pub cycle: Cycle,
 }
 
-/// The decisions of a drive, by stop; null where none is known.
+/// The decisions of a drive, by stop; `None` if unknown.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Decisions(Vec<Option<Followed>>);
 
 impl Decisions {
-    /// Reads those that led to the stops after the first of `stop_count`.
+    /// Reads the decisions that led to the stops after the first of `stop_count`.
     ///
     /// # Errors
-    /// A file that cannot be read, or with something else in it.
+    /// A file that cannot be read, or with other content.
     pub(crate) fn read(folder: &Path, stop_count: usize) -> Result<Self> {
         let path = folder.join(FILE);
         let text = match read_text(&path) {
@@ -48,7 +48,7 @@ impl Decisions {
         Ok(Self(list).cut(stop_count))
     }
 
-    /// Writes them.
+    /// Writes the decisions.
     ///
     /// # Errors
     /// A file that cannot be written.
@@ -59,7 +59,7 @@ impl Decisions {
         write_atomically(&path, &text)
     }
 
-    /// Those that led to the first `stop_count` stops.
+    /// The decisions that led to the first `stop_count` stops.
     pub(crate) fn cut(&self, stop_count: usize) -> Self {
         Self(self.0.iter().take(stop_count.saturating_sub(1)).cloned().collect())
     }

@@ -1,7 +1,7 @@
-//! The images of a traverse: read from their files when they are asked for, and rendered before where a simulated one is missing.
+//! The images of a traverse: read from their files on demand; missing images of a simulated traverse are rendered first.
 //!
-//! The pairs used last are kept in the stores that the targets share ([`Stores`]), whose cache has a limit in bytes. Every
-//! pair of cameras has a store of its own, so that nothing that was found in one pair is taken for another.
+//! The pairs used last are kept in the stores that the targets share ([`Stores`]), whose cache has a limit in bytes.
+//! Every camera pair has its own store, so that results of one pair are never used for another.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -19,7 +19,7 @@ use super::check::FurtherCameras;
 use super::files::resolve;
 use super::native::Traverse;
 
-/// Earlier results, for each pair of cameras.
+/// Earlier results, for each camera pair.
 pub(super) struct Stores {
     cache: Arc<Cache>,
     main: SharedStore,
@@ -35,7 +35,7 @@ impl Stores {
         stores
     }
 
-    /// Makes room for the pairs of one more stop.
+    /// Adds stores for the pairs of one more stop.
     pub(super) fn add_cameras_of(&mut self, stop: &Stop) {
         for camera in &stop.cameras {
             if self.further.iter().all(|(name, _)| *name != camera.name) {
@@ -51,7 +51,7 @@ impl Stores {
     }
 }
 
-/// An image of a stop with its names in messages.
+/// An image of a stop, with its names for messages.
 struct Source<'a> {
     words: String,
     field: String,
@@ -76,7 +76,7 @@ impl Traverse {
         self.is_rendered(step, None)
     }
 
-    /// The same for the main pair or a further camera; a stop that lacks the camera has nothing to render.
+    /// As [`Self::is_ready`], for the main pair or a further camera; `true` if the stop lacks the camera.
     pub fn is_rendered(&self, step: usize, camera: Option<CameraName>) -> bool {
         let Some((left, right)) = views(&self.index.stops[step], camera) else { return true };
         self.simulated.is_none() || (self.exists(left) && right.is_none_or(|right| self.exists(right)))
@@ -86,7 +86,7 @@ impl Traverse {
         resolve(&self.folder, &view.image).is_ok_and(|path| path.exists())
     }
 
-    /// Renders the images of a simulated stop's main pair that are missing; does nothing for a recorded one.
+    /// Renders the missing images of a simulated stop's main pair; does nothing for a recorded one.
     ///
     /// # Errors
     /// No such stop, images that cannot be written, or [`Error::Cancelled`] soon after `cancel` is set.
@@ -94,7 +94,7 @@ impl Traverse {
         self.render_camera(step, None, cancel)
     }
 
-    /// The same for the main pair or a further camera.
+    /// As [`Self::render_step`], for the main pair or a further camera.
     ///
     /// # Errors
     /// As [`Self::render_step`], and a stop without a camera of this name.
@@ -108,16 +108,16 @@ impl Traverse {
         }
     }
 
-    /// The main stereo pair of a stop, in fractions of full scale; a simulated one is rendered where it is missing.
+    /// The main stereo pair of a stop, in fractions of full scale; a simulated one is rendered if missing.
     ///
     /// # Errors
-    /// No such stop, or an image that is missing, damaged or not of its camera's size; the sentence names it relative to the
-    /// folder, because it becomes part of the step's record, which must not depend on where the folder is.
+    /// No such stop, or an image that is missing, damaged or not of its camera's size; the sentence names it relative
+    /// to the folder, because it becomes part of the step's record, which must not depend on the folder's location.
     pub fn capture(&self, step: usize) -> Result<StereoPair> {
         self.capture_until(step, &AtomicBool::new(false))
     }
 
-    /// [`Traverse::capture`], which ends soon after `cancel` is set.
+    /// As [`Traverse::capture`], but ends soon after `cancel` is set.
     ///
     /// # Errors
     /// As [`Traverse::capture`], and [`Error::Cancelled`].
@@ -125,7 +125,7 @@ impl Traverse {
         self.capture_pair(step, None, cancel)
     }
 
-    /// [`Traverse::capture_until`] for the main pair or a further one.
+    /// As [`Traverse::capture_until`], for the main pair or a further one.
     ///
     /// # Errors
     /// As [`Traverse::capture_until`], a stop without a camera of this name, and a single camera.
@@ -178,7 +178,7 @@ impl Traverse {
         Ok(wanted)
     }
 
-    /// An image of a stop by camera and eye.
+    /// An image of a stop by camera and side.
     fn source(&self, step: usize, camera: Option<CameraName>, is_left: bool) -> Result<Source<'_>> {
         let (stop, cameras) = (self.stop_with_images(step)?, &self.cameras[step]);
         let side = if is_left { "left" } else { "right" };
@@ -200,7 +200,7 @@ impl Traverse {
         Ok(Source { words, field: format!("stops[{step}].cameras[{k}].{side}.image"), view, camera })
     }
 
-    /// The error with the path of its file relative to the folder.
+    /// Makes the path in an error relative to the folder.
     fn without_folder(&self, error: Error) -> Error {
         let relative = |path: PathBuf| match path.strip_prefix(&self.folder) {
             Ok(inside) if inside != Path::new("") => inside.to_owned(),
@@ -221,14 +221,14 @@ impl Traverse {
 
     fn keep_pair(&self, step: usize, camera: Option<CameraName>, pair: &StereoPair) {
         if let Some(store) = self.stores.of(camera) {
-            // The bytes of the cache are the limit.
+            // Only the bytes of the cache are limited.
             store.keep(step, &(), usize::MAX, Arc::new(pair.clone()));
         }
     }
 
     fn read_image(&self, source: &Source<'_>) -> Result<GrayImage> {
         let Source { words, field, view, camera } = source;
-        // Checked again, because a link may have been put there since the folder was opened.
+        // Checked again, because a link may have been created since the folder was opened.
         let path = resolve(&self.folder, &view.image)
             .map_err(|problem| Error::format(&self.index_path, format!("{field}: {problem}")))?;
         let named = |error| match error {
@@ -245,7 +245,7 @@ impl Traverse {
             };
             ([width, height] == camera.size).then_some(()).ok_or_else(|| Error::format(&path, problem()))
         };
-        // The header first: decoding takes memory for as many pixels as the file states.
+        // The header first: decoding allocates memory for as many pixels as the file states.
         check(io::png_size(&path).map_err(named)?)?;
         let image = io::read_png_of_size(&path, self.index.full_scale_dn, camera.size).map_err(named)?;
         check(image.dimensions().into())?;
@@ -253,7 +253,7 @@ impl Traverse {
     }
 }
 
-/// The left and, where there is one, the right view of a stop's camera; `None` where the stop has no such camera.
+/// The left and, if there is one, the right view of a stop's camera; `None` if the stop lacks the camera.
 pub(super) fn views(stop: &Stop, camera: Option<CameraName>) -> Option<(&View, Option<&View>)> {
     match camera {
         None => Some((&stop.left, Some(&stop.right))),
@@ -261,7 +261,7 @@ pub(super) fn views(stop: &Stop, camera: Option<CameraName>) -> Option<(&View, O
     }
 }
 
-/// The refusal of a stop that lacks a camera; the main pair is never lacking.
+/// The error of a stop that lacks a camera; the main pair is never missing.
 pub(super) fn no_camera(step: usize, camera: Option<CameraName>) -> Error {
     camera.map_or_else(
         || Error::Request(format!("stop {step} has no main pair")),

@@ -1,7 +1,7 @@
 //! Reading and writing the index of a traverse, as TOML or JSON.
 //!
-//! Numbers are written with all their digits, so that reading gives the same bits. What cannot be read is
-//! answered with the file, the line and the field (`traverse.toml: line 12: stops[3].left.camera: …`).
+//! Numbers are written with all their digits, so that reading gives the same bits. Errors name the file, the line and
+//! the field (`traverse.toml: line 12: stops[3].left.camera: …`).
 
 use std::path::{Path, PathBuf};
 
@@ -16,10 +16,10 @@ const SIZE_LIMIT: u64 = 64 << 20;
 /// The form of an index.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum IndexFormat {
-    /// `traverse.toml`, which people write by hand.
+    /// `traverse.toml`, written by hand.
     #[default]
     Toml,
-    /// `traverse.json`, which programs write.
+    /// `traverse.json`, written by programs.
     Json,
 }
 
@@ -33,20 +33,20 @@ impl IndexFormat {
     }
 }
 
-/// What to do with an index that is already there.
+/// The treatment of an existing index.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Existing {
-    /// Leave it and say so.
+    /// Keep it and return an error.
     #[default]
     Refuse,
     /// Replace it.
     Replace,
 }
 
-/// Where the index of `path` is, which may be the folder or the index itself.
+/// Returns the path of the index of `path`, which may be the folder or the index itself.
 ///
 /// # Errors
-/// Nothing there, no index in the folder, or two of them.
+/// No such path, no index in the folder, or two of them.
 pub(super) fn find(path: &Path) -> Result<(PathBuf, IndexFormat)> {
     if path.is_dir() {
         let present = [IndexFormat::Toml, IndexFormat::Json].map(|format| path.join(format.file_name()));
@@ -75,10 +75,10 @@ pub(super) fn find(path: &Path) -> Result<(PathBuf, IndexFormat)> {
     Ok((path.to_owned(), format))
 }
 
-/// Reads an index; its content is not checked beyond its form.
+/// Reads an index; only the form of its content is checked.
 ///
 /// # Errors
-/// A file that cannot be read, or whose form is not that of an index: the sentence names line and field.
+/// A file that cannot be read, or without the form of an index; the sentence names line and field.
 pub(super) fn read(path: &Path, format: IndexFormat) -> Result<TraverseIndex> {
     let unreadable = |source| Error::Read { path: path.to_owned(), source };
     if std::fs::metadata(path).map_err(unreadable)?.len() > SIZE_LIMIT {
@@ -97,7 +97,7 @@ pub(super) fn parse(text: &str, format: IndexFormat) -> Result<TraverseIndex, St
             let index: TraverseIndex = serde_path_to_error::deserialize(&mut json).map_err(|error| {
                 let (line, field) = (error.inner().line(), toml_text::field(&error.path().to_string()));
                 let message = error.inner().to_string();
-                // serde_json puts the place behind the message; here it comes first, as for TOML.
+                // serde_json puts the position behind the message; here it comes first, as for TOML.
                 let message = message.split(" at line ").next().unwrap_or_default();
                 format!("line {line}: {field}{message}")
             })?;
@@ -107,10 +107,10 @@ pub(super) fn parse(text: &str, format: IndexFormat) -> Result<TraverseIndex, St
     }
 }
 
-/// Writes an index into `folder`, which is made where it is missing.
+/// Writes an index into `folder`, which is created if missing.
 ///
 /// # Errors
-/// An index that is there already and may not be replaced, or a folder that cannot be written.
+/// An index that exists and may not be replaced, or a folder that cannot be written.
 pub(super) fn write(
     index: &TraverseIndex,
     folder: &Path,

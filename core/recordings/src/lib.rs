@@ -1,8 +1,8 @@
-//! A traverse: the stops of one drive, each with a pose estimate, a stereo pair and, perhaps, the truth.
+//! A traverse: the stops of one drive, each with a pose estimate, a stereo pair and optionally the truth.
 //!
-//! Everything is opened through the native folder (`native.rs` documents the format): a simulated traverse
-//! is a folder whose images are rendered when they are first asked for, and a foreign recording is turned
-//! into a folder by its importer (`import/`, one file per format).
+//! Everything is opened through the native folder (`native.rs` documents the format): a simulated traverse is a
+//! folder whose images are rendered on first use, and an importer converts a foreign recording to a folder
+//! (`import/`, one file per format).
 
 mod check;
 mod driven;

@@ -1,7 +1,7 @@
-//! The native folder of a traverse: one index, one PNG per image, and perhaps camera files.
+//! The native folder of a traverse: one index, one PNG per image, and optionally camera files.
 //!
-//! The index is `traverse.toml` or `traverse.json` with the same fields ([`TraverseIndex`]); unknown fields
-//! are refused. All names in it are relative to the folder, with `/` and without `..`.
+//! The index is `traverse.toml` or `traverse.json` with the same fields ([`TraverseIndex`]); unknown fields are
+//! rejected. All names in it are relative to the folder, with `/` and without `..`.
 //!
 //! ```toml
 //! format = 1                                # version of this format
@@ -13,13 +13,13 @@
 //! # scenario = "scenario.toml"              # simulated: missing images are rendered from this file
 //!
 //! [odometry_error]                          # 1σ error of the pose estimates; these are the defaults
-//! along_fraction = 0.02                     # of the way driven
+//! along_fraction = 0.02                     # of the distance driven
 //! across_fraction = 0.02
 //! attitude_deg = 0.2                        # per step and axis
 //!
 //! [[stops]]                                 # in driving order, at least one
 //! time_s = 0.0                              # since the first stop
-//! [stops.site_from_rover]                   # the pose estimate that the tracker is given
+//! [stops.site_from_rover]                   # the pose estimate for the tracker
 //! position_m = [0.0, 0.0, 0.0]              # origin of the rover frame in the site frame
 //! quaternion_sxyz = [1.0, 0.0, 0.0, 0.0]    # scalar first, rotates rover vectors into the site frame
 //! [stops.left]
@@ -37,21 +37,21 @@
 //! image = "images/0000_right.png"
 //! camera = { file = "right.cahvor" }        # or a file in JPL's text form
 //!
-//! [stops.truth.site_from_rover]             # optional: the true pose, and true cameras where they differ
+//! [stops.truth.site_from_rover]             # optional: the true pose, and true cameras if they differ
 //! position_m = [0.0, 0.0, 0.0]
 //! quaternion_sxyz = [1.0, 0.0, 0.0, 0.0]
 //! ```
 //!
-//! Optional besides: `[mast]` (origin and head cameras), `stops.mast_angles` (azimuth and elevation, rad),
-//! `stops.metered_px` (`x`, `y`: centre of the exposure subframe in the left image, px) and
-//! `stops.light` (`sun_azimuth_deg`, `sun_elevation_deg` in the site frame, `exposure_s` of the left image). The truth of a simulated stop may have
-//! `wheel_places_m`, the wheels' way to it (site frame, m).
+//! Further optional fields: `[mast]` (origin and head cameras), `stops.mast_angles` (azimuth and elevation, rad),
+//! `stops.metered_px` (`x`, `y`: centre of the exposure subframe in the left image, px) and `stops.light`
+//! (`sun_azimuth_deg`, `sun_elevation_deg` in the site frame, `exposure_s` of the left image). The truth of a
+//! simulated stop may have `wheel_places_m`, the positions of the wheels on the way to it (site frame, m).
 //!
-//! A simulated folder also gets `cache/`, from which nothing but time is lost when it is removed, and on demand
-//! `truth/`, the truth of every pixel (`truth_files.rs` documents it).
+//! A simulated folder also gets `cache/`, whose removal costs only time, and on demand `truth/`, the truth of every
+//! pixel (`truth_files.rs` documents it).
 //!
-//! A stop may have any number of cameras (up to 16) beside its main pair, each with a name of its own (`a` to `z`, `0` to `9`
-//! and `_`, at most 32 characters). The same name at another stop is the same camera; a stop may lack it.
+//! A stop may have up to 16 cameras beside its main pair, each with its own name (`a` to `z`, `0` to `9` and `_`, at
+//! most 32 characters). The same name at another stop is the same camera; a stop may lack it.
 //!
 //! ```toml
 //! [[stops.cameras]]                         # after the other fields of the stop
@@ -91,7 +91,7 @@ pub struct Traverse {
     pub(super) index: TraverseIndex,
     pub(super) cameras: Vec<StopCameras>,
     warnings: Vec<String>,
-    /// Images, features, surfaces and motions that were found before.
+    /// Stores of earlier images, features, surfaces and motions.
     pub(super) stores: Stores,
     pub(super) simulated: Option<Simulated>,
     /// The first stage that a paused drive put off at the last stop.
@@ -125,7 +125,7 @@ impl Traverse {
         Ok(Self { folder, index_path, index, cameras, warnings, stores, simulated, awaits: None })
     }
 
-    /// The same folder, opened anew, with the world that is built already.
+    /// Opens the same folder again, keeping a world that is already built.
     ///
     /// # Errors
     /// As [`Self::open`].
@@ -137,14 +137,14 @@ impl Traverse {
         Ok(copy)
     }
 
-    /// The same traverse, which shares a cache with others.
+    /// The same traverse with a cache shared with others.
     #[must_use]
     pub fn with_cache(mut self, cache: &Arc<Cache>) -> Self {
         self.stores = Stores::new(cache, &self.index);
         self
     }
 
-    /// Puts a stop at the end, or in the place of the last one; its images are those of the index's names.
+    /// Adds a stop at the end, or replaces the last one; its images are those named in the index.
     ///
     /// # Errors
     /// A stop with implausible numbers.
@@ -159,7 +159,7 @@ impl Traverse {
         Ok(())
     }
 
-    /// Forgets the stops from `count` on, with all that was found in their images.
+    /// Removes the stops from `count` on, with all results from their images.
     pub(super) fn truncate(&mut self, count: usize) {
         if count < self.index.stops.len() {
             self.index.stops.truncate(count);
@@ -179,7 +179,7 @@ impl Traverse {
         &self.folder
     }
 
-    /// What a person should know about this traverse, one sentence each.
+    /// Warnings about this traverse, one sentence each.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
@@ -205,20 +205,19 @@ impl Traverse {
         self.index.stops[step].site_from_rover.to_pose()
     }
 
-    /// The true pose of the rover in the site frame, where it is known.
+    /// The true pose of the rover in the site frame; `None` if unknown.
     pub fn true_site_from_rover(&self, step: usize) -> Option<Pose> {
         Some(self.index.stops[step].truth.as_ref()?.site_from_rover.to_pose())
     }
 
-    /// The camera in the rover frame that truly took the left image, as far as is known: the given one where
-    /// the index says nothing else.
+    /// The true camera of the left image in the rover frame; the given one if the index contains no other.
     pub fn true_left_camera(&self, step: usize) -> &Camera {
         self.cameras[step].true_left()
     }
 
     /// The simulated world, whose surface is the truth; `None` for a recorded traverse.
     ///
-    /// It is built when it is first asked for, which may take seconds.
+    /// It is built on first use, which may take seconds.
     pub fn world(&self) -> Option<&World> {
         self.simulated.as_ref().map(Simulated::world)
     }
@@ -233,12 +232,12 @@ impl Traverse {
         self.awaits.is_some() && step + 1 == self.stop_count()
     }
 
-    /// The stops as the renderer sees them.
+    /// The stops as the renderer's input.
     pub(super) fn stops(&self) -> Stops<'_> {
         Stops { folder: &self.folder, index: &self.index, cameras: &self.cameras }
     }
 
-    /// A stop that has images, or gets them.
+    /// Returns a stop; an error if a paused drive has not taken its images yet.
     pub(super) fn stop_with_images(&self, step: usize) -> Result<&Stop> {
         let stop = self.stop(step)?;
         if self.is_awaited(step) {
@@ -256,11 +255,10 @@ impl Traverse {
     }
 }
 
-/// Writes an index into `folder`, which is made where it is missing; images are written by the caller.
+/// Writes an index into `folder`, which is created if missing; images are written by the caller.
 ///
 /// # Errors
-/// An index with an implausible number in it, one that is there already and may not be replaced, or a folder that
-/// cannot be written.
+/// An index with an implausible number, one that exists and may not be replaced, or a folder that cannot be written.
 pub fn write(index: &TraverseIndex, folder: &Path, format: IndexFormat, existing: Existing) -> Result<()> {
     let problem = |problem| Error::format(folder.join(format.file_name()), problem);
     check::check_index(index).map_err(problem)?;

@@ -68,7 +68,7 @@ fn further_cameras_survive_both_forms_and_have_their_own_images() {
             "{missing}"
         );
     }
-    // Nothing new is written where there is none.
+    // Nothing new is written without further cameras.
     let plain = std::fs::read_to_string(folder(IndexFormat::Toml).path().join("traverse.toml")).unwrap();
     assert!(!plain.contains("cameras") && !plain.contains("true_left_camera"));
 }

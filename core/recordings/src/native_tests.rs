@@ -1,4 +1,4 @@
-//! Folders that open, folders that do not, and what they say.
+//! Folders that can be opened, folders that cannot, and their messages.
 
 use super::*;
 use sightline_geometry::camera::{Cahv, Cahvor, CameraModel, text};
@@ -227,7 +227,7 @@ fn named_pipe_in_place_of_an_image_or_a_camera_is_refused() {
     pipe("left.cahvor");
     let mut with_file = index(3);
     with_file.stops[2].left.camera = CameraSource::File { file: "left.cahvor".into() };
-    // Nobody ever writes into the pipes: whoever opened one would wait for ever.
+    // No program writes into the pipes: opening one for reading would block for ever.
     let path = folder.path();
     let image = Traverse::open(path).unwrap().capture(1).unwrap_err().to_string();
     write(&with_file, path, IndexFormat::Toml, Existing::Replace).unwrap();

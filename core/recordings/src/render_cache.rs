@@ -1,23 +1,23 @@
-//! Clean radiance kept on disk, so that a change of exposure, detector or noise renders nothing again.
+//! Clean radiance stored on disk, so that a change of exposure, detector or noise needs no rendering.
 //!
-//! A picture's file is `<key>.npy` with the digest of its bytes behind the array:
+//! The file of an image is `<key>.npy`, with the digest of its bytes after the array:
 //!
 //! ```text
-//! key     = SHA-256 of (sources of the renderer, scenario without what the radiance does not depend on,
+//! key     = SHA-256 of (sources of the renderer, scenario without fields that do not affect the radiance,
 //!           moment of the drive, camera in the site), as JSON with exact numbers
 //! file    = .npy array of f32 (rows from the top), then the 32 bytes of its SHA-256
 //! ```
 //!
-//! The key leaves out the name, the pose estimate's error, the rule for targets, and the exposure, the detector
-//! and the noise of the camera; a setting that is added later is in the key until it is left out here.
-//! A file that is cut short, changed, or of another size is not used. Another compiler or processor may have rendered
-//! the same sources otherwise: the user of the cache finds out by rendering a few pixels again.
+//! The key omits the name, the pose estimate's error, the rule for targets, and the exposure, the detector and the
+//! noise of the camera; a setting that is added later is in the key until it is omitted here. A file that is
+//! truncated, changed, or of another size is not used. Another compiler or processor may render other bits from the
+//! same sources: the user of the cache checks this by rendering a few pixels again.
 //!
-//! Files are written under a temporary name and renamed, so several processes can share a folder: they write
-//! the same bytes. When the folder grows beyond its limit, the files that were written first are removed. A
-//! folder that cannot be written costs time and nothing else. Only names of 64 hexadecimal digits are touched.
+//! Files are written under a temporary name and renamed, so several processes can share a folder: they write the same
+//! bytes. If the folder exceeds its limit, the oldest files are removed. A folder that cannot be written costs only
+//! time. Only names of 64 hexadecimal digits are touched.
 //!
-//! Units: radiance as in `sim/light/reflection.rs`; sizes in bytes. Source: ours.
+//! Units: radiance as in `world/src/light/reflection.rs`; sizes in bytes. Source: ours.
 
 use std::path::{Path, PathBuf};
 
@@ -32,7 +32,7 @@ use sightline_world::scenario::RoverSettings;
 
 /// Name of the cache folder within the folder of a traverse.
 pub(crate) const CACHE_FOLDER: &str = "cache";
-/// What a traverse's own cache may take on disk, bytes: 128 pictures of 1024 × 1024.
+/// Limit of a traverse's own cache on disk, bytes: 128 images of 1024 × 1024.
 pub(crate) const RENDER_LIMIT_BYTES: u64 = 512 << 20;
 
 /// Digest of the sources of the renderer, from the build script.
@@ -41,7 +41,7 @@ const SOURCES: &str = env!("SIGHTLINE_RENDERER_SOURCES");
 /// Bytes of a digest.
 const DIGEST_BYTES: usize = 32;
 
-/// A folder of clean radiance pictures.
+/// A folder of clean radiance images.
 #[derive(Clone, Debug)]
 pub struct RenderCache {
     folder: PathBuf,
@@ -49,23 +49,23 @@ pub struct RenderCache {
 }
 
 impl RenderCache {
-    /// A cache in `folder`, which is made when it is first written to; a limit of 0 keeps nothing.
+    /// A cache in `folder`, which is created on the first write; a limit of 0 keeps nothing.
     pub fn new(folder: impl Into<PathBuf>, limit_bytes: u64) -> Self {
         Self { folder: folder.into(), limit_bytes }
     }
 
     /// The cache of a traverse in its own folder.
     pub(super) fn of_traverse(folder: &Path) -> Self {
-        // A link that leads elsewhere is not followed: an index may come from anyone.
+        // A link to another folder is not followed: an index may come from an untrusted source.
         let limit = if super::files::resolve(folder, CACHE_FOLDER).is_ok() { RENDER_LIMIT_BYTES } else { 0 };
         Self::new(folder.join(CACHE_FOLDER), limit)
     }
 
-    /// The picture of this key, if it is there, whole, and of the camera's size.
+    /// The image of this key, if it exists, is complete, and has the camera's size.
     pub(super) fn load(&self, key: &str, camera: &Camera) -> Option<GrayImage> {
         let path = self.path(key);
         let pixels = u64::from(camera.width()) * u64::from(camera.height());
-        // Anything far larger than the picture is not read at all.
+        // A file far larger than the image is not read at all.
         if self.limit_bytes == 0 || std::fs::metadata(&path).ok()?.len() > 4 * pixels + 4096 {
             return None;
         }
@@ -79,7 +79,7 @@ impl RenderCache {
             .filter(|picture| picture.dimensions() == (camera.width(), camera.height()))
     }
 
-    /// Keeps a picture, and removes the oldest ones beyond the limit.
+    /// Stores an image, and removes the oldest ones beyond the limit.
     pub(super) fn store(&self, key: &str, picture: &GrayImage) {
         let Ok(mut file) = npy::encode(picture) else { return };
         let digest = Sha256::digest(&file);
@@ -93,7 +93,7 @@ impl RenderCache {
         self.folder.join(format!("{key}.npy"))
     }
 
-    /// Removes the files that were written first until all fit into the limit.
+    /// Removes the oldest files until the rest fits into the limit.
     fn remove_oldest(&self) {
         let Ok(entries) = std::fs::read_dir(&self.folder) else { return };
         let mut files: Vec<_> = entries
@@ -117,7 +117,7 @@ impl RenderCache {
     }
 }
 
-/// Whether a file is one of a cache, finished or left behind by a process that was ended while writing.
+/// Whether a file belongs to a cache, complete or left behind by a process that was killed while writing.
 fn is_ours(name: &str) -> bool {
     let mut parts = name.trim_start_matches('.').split('.');
     let digits = parts.next().unwrap_or_default();
@@ -125,13 +125,13 @@ fn is_ours(name: &str) -> bool {
     is_key && parts.next() == Some("npy")
 }
 
-/// What the clean radiance of a picture depends on, as 64 hexadecimal digits; `moment` is what is particular to
-/// its stop besides the camera: number, time, true pose.
+/// The key of an image's clean radiance, 64 hexadecimal digits; `moment`: the state of its stop besides the camera
+/// (number, time, true pose).
 pub(super) fn key(scenario: &Scenario, moment: &impl Serialize, camera_in_site: &Camera) -> String {
     key_of(SOURCES, scenario, moment, camera_in_site)
 }
 
-/// The key of a picture that these sources render.
+/// The key of an image rendered by these sources.
 fn key_of(sources: &str, scenario: &Scenario, moment: &impl Serialize, camera_in_site: &Camera) -> String {
     let default = Scenario::default();
     let of_radiance = Scenario {
@@ -144,7 +144,7 @@ fn key_of(sources: &str, scenario: &Scenario, moment: &impl Serialize, camera_in
         ..scenario.clone()
     };
     let all = (sources, of_radiance, moment, camera_in_site);
-    // All of it is plain numbers and names, which JSON can always write.
+    // All values are plain numbers and names, which JSON can always write.
     let text = serde_json::to_vec(&all).unwrap_or_default();
     Sha256::digest(&text).iter().map(|byte| format!("{byte:02x}")).collect()
 }
@@ -229,7 +229,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let [one, two, _] = keys();
         (0..64).into_par_iter().for_each(|k| {
-            // Each with a cache of its own, as processes have; one picture fits, the other one is removed.
+            // Each has its own cache, as processes do; one image fits, the other one is removed.
             let cache = RenderCache::new(folder.path(), 1500);
             let (key, value) = if k % 2 == 0 { (&one, 0.1) } else { (&two, 0.2) };
             cache.store(key, &picture(value));

@@ -1,9 +1,9 @@
-//! A recording as a world to drive in: it answers every command with its recorded data, and compares the command with them.
+//! A recording as a world to drive in: it answers every command with its recorded data, and compares the two.
 //!
-//! The rover goes where it went when the drive was recorded, whatever it is told. An [`Answer`] says how far the commanded
-//! motion and mast angles are from the recorded ones. Every traverse can be replayed, a simulated one too.
+//! The rover repeats its recorded motion, whatever the command. An [`Answer`] contains the differences of the
+//! commanded motion and mast angles from the recorded ones. Every traverse can be replayed, including a simulated one.
 //!
-//! Frame: the rover frame of the stop before, horizontal, m and rad. Source: papers.md R94, R104.
+//! Frame: the rover frame of the previous stop, horizontal, m and rad. Source: papers.md R94, R104.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -22,7 +22,7 @@ use crate::native::Traverse;
 /// The difference between a command and the recorded stop.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Answer {
-    /// The number of the stop to which the command led.
+    /// The step of the stop reached by the command.
     pub step: usize,
     /// The end of the commanded motion, ahead and to the right, m.
     pub commanded_m: [f64; 2],
@@ -32,7 +32,7 @@ pub struct Answer {
     pub recorded_m: [f64; 2],
     /// The recorded turn of the heading, rad, positive to the right.
     pub recorded_turn_rad: f64,
-    /// Distance between both ends, m.
+    /// Distance between the commanded and the recorded end, m.
     pub apart_m: f64,
     /// Angle between the commanded and the recorded direction of the mast, deg; null without a mast.
     pub mast_apart_deg: Option<f64>,
@@ -46,22 +46,22 @@ pub struct Replayed<'a> {
 }
 
 impl<'a> Replayed<'a> {
-    /// The traverse from a stop on.
+    /// Replays the traverse from a stop on.
     pub fn new(traverse: &'a Traverse, step: usize) -> Self {
         Self { traverse, reached: step, answers: Vec::new() }
     }
 
-    /// Whether there is a stop after the present one.
+    /// Whether there is a stop after the current one.
     pub fn goes_on(&self) -> bool {
         self.reached + 1 < self.traverse.stop_count()
     }
 
-    /// The comparisons so far, one a command.
+    /// The comparisons so far, one per command.
     pub fn answers(&self) -> &[Answer] {
         &self.answers
     }
 
-    /// Goes on to the next stop.
+    /// Moves on to the next stop.
     fn go_on(&mut self, motion: Option<&Motion>) -> Result<DriveReport> {
         if !self.goes_on() {
             return Err(Error::Request(format!("the recording ends at stop {}", self.reached)));

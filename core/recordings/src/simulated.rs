@@ -1,26 +1,25 @@
-//! A simulated traverse: a native folder whose images are rendered when they are first asked for.
+//! A simulated traverse: a native folder whose images are rendered on first use.
 //!
-//! The folder holds `scenario.toml` and the index that follows from it. An image that is missing is rendered
-//! from the true camera, written under a temporary name and renamed; from then on the file is the image, so a
-//! pair is the same whether it was rendered just now or long ago.
+//! The folder contains `scenario.toml` and the index derived from it. A missing image is rendered from the true
+//! camera, written under a temporary name and renamed; from then on the file is the image, so a pair is the same
+//! whether it was rendered just now or long ago.
 //!
-//! Rendering makes clean radiance, which is kept ([`RenderCache`]); the image is developed from it. A scenario
-//! that differs in exposure, detector or noise alone finds the radiance there, in a folder that both share
-//! (`Traverse::with_render_cache`). Radiance from there is used if sixteen of its pixels, rendered again, have
-//! the same bits: the same sources may have rendered otherwise on another processor.
+//! Rendering computes clean radiance, which is stored ([`RenderCache`]); the image is developed from it. A scenario
+//! that differs only in exposure, detector or noise reuses the radiance, in a folder that both share
+//! (`Traverse::with_render_cache`). Stored radiance is used if sixteen of its pixels, rendered again, have the same
+//! bits: the same sources may give other bits on another processor.
 //!
-//! Under automatic exposure both eyes take the exposure of the left one, and each stop starts from the stop
-//! before: an image needs the left radiance of all stops up to its own.
+//! Under automatic exposure both cameras use the exposure of the left one, and each stop starts from that of the
+//! previous stop: an image needs the left radiance of all stops up to its own.
 //!
-//! A further camera is exposed for itself: under fixed exposure its first left picture has the mean level, and the automatic
-//! one starts anew at each stop, so that no earlier picture need be rendered. Its noise and its pixels' response are those that
-//! the same rig would have as the main pair.
+//! A further camera is exposed independently: under fixed exposure its first left image has the mean level, and
+//! automatic exposure starts anew at each stop, so that no earlier image needs to be rendered. Its noise and pixel
+//! response are those that the same rig would have as the main pair.
 //!
-//! Each stop has a lock, so that two who ask for the same stop do not render it twice. The lock is not waited
-//! for inside the thread pool: a pool thread that waits for rendering may be given other work to do, and if
-//! that asks for the same stop it would wait for itself. It renders the stop again instead, with the same
-//! bits, and whichever file is renamed last stays. The exposures are known by a lock that is never held while
-//! anything is rendered.
+//! Each stop has a lock, so that concurrent requests do not render it twice. Threads of the pool do not wait for the
+//! lock: a pool thread that waits for rendering may be given other work, and if that requests the same stop it would
+//! wait for itself. It renders the stop again instead, with the same bits, and the file that is renamed last remains.
+//! The exposures have a lock of their own that is never locked during rendering.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -44,7 +43,7 @@ use sightline_world::{
     Eye, NoiseSeed, Region, Scenario, World, add_dust, add_ghosts, clean_radiance, develop_until,
 };
 
-/// Pixels of a kept picture that are rendered anew before it is believed.
+/// Number of pixels of a stored image that are rendered again for comparison.
 const PROBES: u32 = 16;
 
 /// The largest scenario file that is read, bytes.
@@ -57,19 +56,19 @@ pub(super) struct Stops<'a> {
     pub(super) cameras: &'a [StopCameras],
 }
 
-/// What a simulated traverse has besides its index.
+/// The data of a simulated traverse besides its index.
 pub(super) struct Simulated {
     pub(super) scenario: Scenario,
     pub(super) world: OnceLock<World>,
     locks: Vec<Mutex<()>>,
     pub(super) cache: RenderCache,
-    /// Times of exposure of the first stops, as far as they are known, s.
+    /// Exposure times of the first stops, as far as computed, s.
     exposures_s: Mutex<Vec<f64>>,
     pub(super) rendered: AtomicU32,
 }
 
 impl Simulated {
-    /// Reads the scenario of an index that names one; the world is built when it is first needed.
+    /// Reads the scenario of an index that names one; the world is built on first use.
     pub(super) fn open(index: &TraverseIndex, name: &str, folder: &Path) -> Result<Self, String> {
         let path = resolve(folder, name).map_err(|problem| format!("scenario: {problem}"))?;
         let scenario = read_scenario(&path).map_err(|error| format!("scenario: {error}"))?;
@@ -84,12 +83,12 @@ impl Simulated {
         })
     }
 
-    /// Makes room for one more stop.
+    /// Adds the lock of one more stop.
     pub(super) fn add_stop(&mut self) {
         self.locks.push(Mutex::new(()));
     }
 
-    /// Forgets the exposures of the stops from `count` on.
+    /// Removes the exposures of the stops from `count` on.
     pub(super) fn truncate(&mut self, count: usize) {
         self.locks.truncate(count);
         self.exposures_s.get_mut().unwrap_or_else(PoisonError::into_inner).truncate(count);
@@ -99,7 +98,7 @@ impl Simulated {
         self.world.get_or_init(|| World::new(&self.scenario))
     }
 
-    /// [`Simulated::world`], which ends soon after `cancel` is requested. Two who ask at once may both build it.
+    /// As [`Simulated::world`], but ends soon after `cancel` is requested. Concurrent callers may both build the world.
     pub(super) fn world_until(&self, cancel: Cancel<'_>) -> Result<&World> {
         if let Some(world) = self.world.get() {
             return Ok(world);
@@ -108,7 +107,7 @@ impl Simulated {
         Ok(self.world.get_or_init(|| world))
     }
 
-    /// Renders and writes the images of a stop's main pair, or of a further camera, that are not there yet.
+    /// Renders and writes the missing images of a stop's main pair, or of a further camera.
     pub(super) fn render_missing(
         &self,
         stops: &Stops<'_>,
@@ -143,7 +142,7 @@ impl Simulated {
         Ok(())
     }
 
-    /// The time for which both pictures of a stop are exposed, s.
+    /// The exposure time of both images of a stop, s.
     pub(super) fn exposure_s(&self, stops: &Stops<'_>, step: usize, cancel: &AtomicBool) -> Result<f64> {
         let settings = &self.scenario.camera;
         if settings.exposure == ExposureMode::Fixed {
@@ -162,7 +161,7 @@ impl Simulated {
             let centre = stops.index.stops[stop].metered_px;
             time_s = automatic(&rates, settings, centre, time_s).time_s;
             let mut known = self.exposures_s.lock().unwrap_or_else(PoisonError::into_inner);
-            // Whoever else was at this stop found the same.
+            // A concurrent call at this stop computed the same.
             if known.len() == stop {
                 known.push(time_s);
             }
@@ -170,7 +169,7 @@ impl Simulated {
         Ok(time_s)
     }
 
-    /// The time for which both pictures of a further camera are exposed, s.
+    /// The exposure time of both images of a further camera, s.
     fn exposure_of_further_s(
         &self,
         stops: &Stops<'_>,
@@ -191,7 +190,7 @@ impl Simulated {
         Ok(automatic(&rates, settings, None, settings.auto_exposure.start_s).time_s)
     }
 
-    /// The camera of a picture in the site and its clean radiance: what was kept, or else rendered and kept.
+    /// The camera of an image in the site frame and its clean radiance, from the cache or else rendered and stored.
     fn radiance(
         &self,
         stops: &Stops<'_>,
@@ -228,7 +227,7 @@ impl Simulated {
         Ok((camera, radiance))
     }
 
-    /// One image as the bytes of its file.
+    /// Encodes an image as the bytes of its file.
     fn encode(&self, image: &GrayImage) -> Result<Vec<u8>> {
         let full_scale_dn = self.scenario.camera.recorded_full_scale_dn();
         if full_scale_dn <= 255.0 {
@@ -239,7 +238,7 @@ impl Simulated {
     }
 }
 
-/// Whether sixteen pixels, spread over a kept picture, are rendered with the same bits.
+/// Whether sixteen pixels, spread over a stored image, are rendered with the same bits.
 fn renders_alike(kept: &GrayImage, render: impl Fn(Region) -> Result<GrayImage>) -> Result<bool> {
     for probe in 0..PROBES {
         // Multiples of these two numbers fill a square evenly (Roberts' sequence).
@@ -256,13 +255,12 @@ fn renders_alike(kept: &GrayImage, render: impl Fn(Region) -> Result<GrayImage>)
     Ok(true)
 }
 
-/// What a stop's light and scenery can depend on besides the scenario: its number, time and truth, and the wheel tracks up to
-/// there.
+/// The inputs of a stop's light and scenery besides the scenario: its number, time and truth, and the wheel tracks so far.
 pub(super) fn stop_key(moment: &Moment, stop: &Stop) -> impl Serialize {
     (moment.stop, stop.time_s, stop.truth.clone(), moment.wheel_places_m.clone())
 }
 
-/// The camera that truly takes a picture of a stop, in the site frame.
+/// The true camera of an image of a stop, in the site frame.
 pub(super) fn camera_in_site(
     stops: &Stops<'_>,
     step: usize,
@@ -306,7 +304,7 @@ pub(super) fn needs_truth(step: usize) -> String {
     format!("stops[{step}].truth: is missing, but a simulated stop is rendered from it")
 }
 
-/// The fields of a stop's views, in their order.
+/// The field names of a stop's views, in order.
 fn sides(stop: &Stop) -> impl Iterator<Item = String> {
     let further = stop.cameras.iter().enumerate().flat_map(|(k, camera)| {
         let right = camera.right.as_ref().map(|_| format!("cameras[{k}].right"));
@@ -315,7 +313,7 @@ fn sides(stop: &Stop) -> impl Iterator<Item = String> {
     ["left", "right"].map(str::to_owned).into_iter().chain(further)
 }
 
-/// Whether all images of an index can be rendered into files of their own.
+/// Checks that all images of an index can be rendered into separate files.
 fn check_images(index: &TraverseIndex) -> Result<(), String> {
     let mut names = std::collections::HashSet::new();
     for (step, stop) in index.stops.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! A small world whose images are rendered when they are asked for.
+//! A small world whose images are rendered on first use.
 
 use std::sync::Arc;
 
@@ -43,7 +43,7 @@ fn a_simulated_traverse_renders_what_is_asked_for_and_only_that() {
     assert_eq!(files(folder.path()), 2);
     assert!(traverse.world().is_some());
 
-    // The same as the simulator renders from the true camera, to the bit.
+    // The same bits as the simulator renders from the true camera.
     let stop = &traverse.index().stops[1];
     let camera = sightline_world::true_camera_in_site(stop, Eye::Right).unwrap();
     let seed = NoiseSeed { step: 1, eye: Eye::Right };
@@ -82,7 +82,7 @@ fn the_shadow_on_a_window_is_that_of_its_points_and_is_warned_of() {
     };
     let dark: Vec<(u32, u32)> =
         (30..98).flat_map(|y| (30..98).map(move |x| (x, y))).filter(|(x, y)| is_dark(*x, *y)).collect();
-    // Deep in a shadow, and where there is none for ten pixels around.
+    // Deep in a shadow, and ten pixels away from any.
     let count =
         |x: u32, y: u32| dark.iter().filter(|d| d.0.abs_diff(x) <= 10 && d.1.abs_diff(y) <= 10).count();
     let places = || (40..88).flat_map(|y| (40..88).map(move |x| (x, y)));
@@ -227,7 +227,7 @@ fn sharing(scenario: &Scenario, folder: &Path, name: &str) -> Traverse {
     create_simulated(scenario, &folder.join(name)).unwrap().with_render_cache(shared)
 }
 
-/// The same traverse with nothing kept.
+/// The same traverse with nothing stored.
 fn alone(scenario: &Scenario, folder: &Path) -> Traverse {
     create_simulated(scenario, folder).unwrap().with_render_cache(RenderCache::new(folder, 0))
 }
@@ -330,7 +330,7 @@ fn a_cancelled_capture_builds_no_world_and_writes_no_image() {
     assert!(is_cancelled(traverse.capture_until(0, &AtomicBool::new(true))));
     assert!(traverse.simulated.as_ref().unwrap().world.get().is_none());
     assert!(!folder.path().join("images").join("left_0000.png").exists());
-    // The stop is not given up for it.
+    // The stop can still be captured.
     assert!(traverse.capture(0).is_ok());
     assert!(folder.path().join("images").join("left_0000.png").exists());
 }

@@ -15,16 +15,15 @@ use sightline_world::scenario::EventSettings;
 use sightline_world::traverse::{Stop, StopLight};
 use sightline_world::{SCENARIO_FILE, Scenario, World};
 
-/// Makes the folder of a simulated traverse, without images; opens it where it holds this scenario already.
+/// Creates the folder of a simulated traverse, without images; opens it if it already contains this scenario.
 ///
 /// # Errors
-/// A scenario that no world can be made of, a folder that holds another traverse or images without one, or a
-/// folder that cannot be written.
+/// An invalid scenario, a folder that contains another traverse or images without one, or a folder that cannot be written.
 pub fn create_simulated(scenario: &Scenario, folder: &Path) -> Result<Traverse> {
     create_simulated_until(scenario, folder, Cancel::default())
 }
 
-/// The same; soon after `cancel` is requested nothing is made.
+/// As [`create_simulated`]; once `cancel` is requested, it ends soon and creates nothing.
 ///
 /// # Errors
 /// As [`create_simulated`], and [`Error::Cancelled`].
@@ -55,8 +54,8 @@ pub fn create_simulated_until(scenario: &Scenario, folder: &Path, cancel: Cancel
 }
 
 impl Traverse {
-    /// The same traverse with its clean radiance in another cache, which several traverses may share; a
-    /// recorded traverse stays as it is.
+    /// The same traverse with its clean radiance in another cache, which several traverses may share; a recorded
+    /// traverse is unchanged.
     #[must_use]
     pub fn with_render_cache(mut self, cache: RenderCache) -> Self {
         if let Some(simulated) = &mut self.simulated {
@@ -65,15 +64,14 @@ impl Traverse {
         self
     }
 
-    /// How many pictures of a simulated traverse were rendered since it was opened; those that were developed
-    /// from kept radiance do not count.
+    /// Number of images of a simulated traverse rendered since it was opened, without those developed from stored radiance.
     pub fn rendered_count(&self) -> u32 {
         self.simulated.as_ref().map_or(0, |simulated| simulated.rendered.load(Ordering::Relaxed))
     }
 
-    /// The time for which the pictures of a simulated stop are exposed, s; `None` for a recorded traverse.
+    /// The exposure time of the images of a simulated stop, s; `None` for a recorded traverse.
     ///
-    /// Under automatic exposure it renders the left pictures up to this stop that are not kept.
+    /// Under automatic exposure it renders the left images up to this stop that are not stored.
     ///
     /// # Errors
     /// No such stop, or [`Error::Cancelled`] soon after `cancel` is set.
@@ -85,7 +83,7 @@ impl Traverse {
         simulated.exposure_s(&self.stops(), step, cancel).map(Some)
     }
 
-    /// How a stop was lit and exposed: as recorded, or as the scenario says; nothing where neither is known.
+    /// Light and exposure of a stop, as recorded or by the scenario; `None` if neither is known.
     ///
     /// # Errors
     /// As [`Traverse::exposure_s`].
@@ -106,7 +104,7 @@ impl Traverse {
     /// The state of the world at a stop: sun, occluding objects, and the rover.
     ///
     /// # Errors
-    /// No such stop, or a recorded traverse, whose world nobody knows.
+    /// No such stop, or a recorded traverse, whose world is unknown.
     pub fn world_at(&self, step: usize) -> Result<World> {
         let simulated = self.simulated.as_ref();
         let simulated = simulated
@@ -117,13 +115,13 @@ impl Traverse {
         Ok(simulated.world().at(&moment, &simulated.scenario))
     }
 
-    /// Whether something stands in the way at some of the stops.
+    /// Whether the scenario has occluders at some stops.
     pub(super) fn has_occluders(&self) -> bool {
         let events = self.simulated.as_ref().map(|simulated| &simulated.scenario.events);
         events.is_some_and(EventSettings::has_occluders)
     }
 
-    /// Saves building the world again; one that is there already is the same.
+    /// Sets the world, to save building it again; a world that exists already is the same.
     pub(super) fn keep_world(&self, world: World) {
         if let Some(simulated) = &self.simulated {
             let _ = simulated.world.set(world);

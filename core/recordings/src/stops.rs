@@ -1,8 +1,7 @@
-//! A traverse as the pipeline and the comparison with the truth see it.
+//! A traverse as the input of the pipeline and of the comparison with the truth.
 //!
-//! The pipeline is given estimates only: poses, cameras and images. The truth stands in a trait of its own,
-//! so that no stage can look at it. A recorded traverse knows true poses at most: it has no surface, and
-//! nothing is known to hide a point.
+//! The pipeline receives only estimates: poses, cameras and images. The truth is in a separate trait, so that no
+//! stage can use it. A recorded traverse has at most true poses: it has no surface, and all its points count as visible.
 
 use std::sync::atomic::AtomicBool;
 
@@ -25,7 +24,7 @@ use super::check::FurtherCameras;
 use sightline_geometry::odometry_error::OdometryError;
 use sightline_geometry::stereo_geometry::StereoGeometry;
 
-/// Rays along each side of a window by which its shadow is measured.
+/// Number of rays along each side of a window for measuring its shadow.
 const SHADOW_SAMPLES: u32 = 9;
 
 impl Stops for Traverse {
@@ -129,14 +128,14 @@ impl TruthSource for Traverse {
         surface_point(self.world()?, &self.true_left_in_site(step, camera)?, pixel)
     }
     fn is_visible(&self, step: usize, camera: Option<CameraName>, point_in_site: &Point3) -> bool {
-        // What an event puts in the way stands there at some stops only.
+        // The occluders of an event are present at some stops only.
         let at_stop = if self.has_occluders() { self.world_at(step).ok() } else { None };
         let (Some(world), Some(camera_in_site)) =
             (at_stop.as_ref().or_else(|| self.world()), self.true_left_in_site(step, camera))
         else {
             return true;
         };
-        // The ray of the point's pixel starts where the light enters, which is not C in a fisheye lens.
+        // The ray of the point's pixel starts at the entrance pupil, which is not C in a fisheye lens.
         let ray = camera_in_site.project(point_in_site).and_then(|pixel| camera_in_site.ray(pixel));
         ray.is_some_and(|ray| world.is_visible(&ray.origin, point_in_site))
     }

@@ -1,23 +1,23 @@
-//! The truth of every picture of a simulated traverse, as NumPy files beside the images.
+//! The truth of every image of a simulated traverse, as NumPy files beside the images.
 //!
-//! For each stop and eye, in the folder `truth`, with the stop's number as in the images' names (H rows, W columns):
+//! For each stop and side, in the folder `truth`, with the stop's number as in the images' names (H rows, W columns):
 //!
-//! | file | array | what |
+//! | file | array | content |
 //! |---|---|---|
-//! | `left_0000_range_m.npy` | H × W, `<f4` | distance along the pixel's ray from where it starts, m; infinite for the sky |
-//! | `left_0000_surface.npy` | H × W, `<i4` | 0 sky, 1 ground, 2 + n the rock n of the world, negative: made things |
+//! | `left_0000_range_m.npy` | H × W, `<f4` | distance along the pixel's ray from its origin, m; infinite for the sky |
+//! | `left_0000_surface.npy` | H × W, `<i4` | 0 sky, 1 ground, 2 + n the rock n of the world, negative: artificial objects |
 //! | `left_0000_normal.npy` | H × W × 3, `<f4` | outward unit normal in the site frame; zeros for the sky |
-//! | `left_0000_shadow.npy` | H × W, `\|u1` | 1 where no sun reaches the surface, 0 where it does, 0 for the sky |
+//! | `left_0000_shadow.npy` | H × W, `\|u1` | 1 in shadow, 0 in sunlight and for the sky |
 //!
-//! Made things are −1000 − n for fiducials, −2000 − n for what stands in the way, −3000 − n for the rover, n being the
-//! place in the list of those that are there at that stop. A rock keeps its number all along the drive.
+//! Artificial objects are −1000 − n for fiducials, −2000 − n for occluders, −3000 − n for the rover, with n the index
+//! in the list of those present at that stop. A rock keeps its number during the whole drive.
 //!
-//! A pixel's truth is that of the ray through its centre (`sim/truth.rs`), by the true camera at the true pose: both
-//! stand in the index, `stops.truth`, where `left_camera` and `right_camera` are left out when the cameras that the
-//! tracker is given are the true ones. The surface point of a pixel is `origin + range · direction` of its ray.
+//! A pixel's truth is that of the ray through its centre (`world/src/truth.rs`), by the true camera at the true pose.
+//! Both are in the index, `stops.truth`, where `left_camera` and `right_camera` are omitted if the tracker's cameras
+//! are the true ones. The surface point of a pixel is `origin + range · direction` of its ray.
 //!
 //! Values are cast in `f64` and rounded to `f32` once, which is 0.5 µm at 10 m. A stop of 1024 × 1024 px takes 42 MiB.
-//! Files that are there are left as they are, so that a run that was interrupted goes on where it stopped.
+//! Existing files are kept, so that an interrupted run continues where it stopped.
 //!
 //! Units: m. Frames: pixels, site. Sources: domain.md 2.3 (entrance pupil); the format is ours.
 
@@ -41,7 +41,7 @@ pub(crate) const TRUTH_FOLDER: &str = "truth";
 /// The number of the sky in the file of surfaces.
 pub(crate) const SKY: i32 = 0;
 
-/// The truth of a pixel as the files have it.
+/// The truth of a pixel as stored in the files.
 #[derive(Clone, Copy, Debug)]
 struct PixelTruth {
     range_m: f32,
@@ -50,7 +50,7 @@ struct PixelTruth {
     shadow: u8,
 }
 
-/// What a pixel shows that shows nothing.
+/// The truth of a pixel without a surface.
 const OF_SKY: PixelTruth = PixelTruth { range_m: f32::INFINITY, surface: SKY, normal: [0.0; 3], shadow: 0 };
 
 /// The number of a surface in the files.
@@ -66,7 +66,7 @@ pub(crate) fn surface_number(surface: SurfaceId) -> i32 {
 }
 
 impl Traverse {
-    /// Writes the truth of both pictures of a simulated stop that is not there yet.
+    /// Writes the missing truth files of both images of a simulated stop.
     ///
     /// # Errors
     /// No such stop, a recorded traverse, files that cannot be written, or [`Error::Cancelled`] soon after `cancel`

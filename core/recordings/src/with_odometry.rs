@@ -1,4 +1,4 @@
-//! A drive that was planned, with the motion between its stops measured in their images (R124–R126).
+//! A planned drive, with the motion between its stops measured in their images (R124–R126).
 
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
@@ -9,14 +9,14 @@ use sightline_rover::visual_odometry::{MeasuredMotion, OdometryMode, OdometryPre
 use super::Traverse;
 
 impl Traverse {
-    /// The same drive with visual odometry. The folder stays as it is; images that are missing are rendered.
+    /// The same drive with visual odometry. The index in the folder is unchanged; missing images are rendered.
     ///
     /// * `Off`: the poses are those of the folder, by wheels and IMU.
-    /// * `SlipCheck`: the same, and the drive ends at the first stop at which the slip along the motion is measured as larger
-    ///   than the default limit of a drive (0.9 of the wheels' motion): the stops after it are left out.
-    /// * `Full`: the poses (`site_from_rover`, m) are chained anew. The motion by wheels and IMU between two stops, applied
-    ///   to the corrected pose of the first, is the prediction; an accepted update gives the pose, a refused one keeps the
-    ///   prediction.
+    /// * `SlipCheck`: the same, and the drive ends at the first stop at which the measured slip along the motion
+    ///   exceeds the default limit of a drive (0.9 of the wheels' motion): later stops are omitted.
+    /// * `Full`: the poses (`site_from_rover`, m) are chained anew. The motion by wheels and IMU between two stops,
+    ///   applied to the corrected pose of the first, is the prediction; an accepted update gives the pose, a rejected
+    ///   one keeps the prediction.
     ///
     /// # Errors
     /// A folder or images that cannot be read, or [`sightline_geometry::error::Error::Cancelled`].
@@ -37,7 +37,7 @@ impl Traverse {
             if mode == OdometryMode::Full {
                 traverse.index.stops[step].site_from_rover = PoseRecord::from(&(before * by_wheels));
             }
-            // Where the rover stayed there is nothing to measure.
+            // If the rover did not move, there is nothing to measure.
             if wheels[step - 1] == wheels[step] {
                 continue;
             }

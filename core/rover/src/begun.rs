@@ -1,4 +1,4 @@
-//! A step that ends before it is whole: paused between two stages, or at a stop without images for the tracker.
+//! A step that ends early: paused between two stages, or at a stop without images for the tracker.
 
 use sightline_track::locate::Located;
 use sightline_track::stages::capture::Capture;
@@ -9,7 +9,7 @@ use sightline_track::stages::update::Updated;
 use sightline_track::target::Target;
 use sightline_track::trace::{StepKind, StepTrace};
 
-/// What such a step has in any case.
+/// Parts that every such step has.
 pub(crate) struct Begun<'a> {
     pub(crate) step: usize,
     pub(crate) time_s: f64,
@@ -32,7 +32,7 @@ impl Begun<'_> {
         self.unseen(StepKind::Begun { predict, is_mast_pointed, capture, locate, judge })
     }
 
-    /// The step of a stop at which visual odometry runs alone.
+    /// The step of a stop at which only visual odometry runs.
     pub(crate) fn odometry_alone(&self) -> StepTrace {
         self.unseen(StepKind::OdometryAlone { predict: self.predict.clone() })
     }
@@ -42,12 +42,12 @@ impl Begun<'_> {
         self.unseen(StepKind::OutOfView { predict: self.predict.clone() })
     }
 
-    /// The step of a stop whose images cannot be had.
+    /// The step of a stop whose images are missing or damaged.
     pub(crate) fn damaged(&self, fault: String) -> StepTrace {
         self.unseen(StepKind::Damaged { predict: self.predict.clone(), fault })
     }
 
-    /// A step without an update: the target is where the prediction puts it, the state stays.
+    /// A step without an update: the target is at its predicted position, the state is unchanged.
     fn unseen(&self, kind: StepKind) -> StepTrace {
         let update = Updated {
             target: self.carried.clone(),

@@ -1,17 +1,16 @@
-//! The three ways to name a target (K§3, R16–R19), each brought to a position in the left image of a stop.
+//! The three ways to specify a target (K§3, R16–R19), each converted to a pixel of a stop's left image.
 //!
 //! | way | given | the target's pixel |
 //! |---|---|---|
-//! | 1 (R16) | pixel, with the mast angles of its image where they are known | the pixel |
+//! | 1 (R16) | pixel, with the mast angles of its image if known | the pixel |
 //! | 2 (R17) | point in the rover frame of the stop | its projection into the left image |
 //! | 3 (R18) | point in the site frame | the same, by the estimated pose of the stop |
 //!
-//! From there on all three are one: point stereo gives the 3-D position (R19). A replayed drive keeps its recorded
-//! pointing, so that a point that lies outside the picture is refused with the angles that would centre it; and mast
-//! angles that are not those of the stop's image name another image, of which the pixel would be.
+//! Point stereo then gives the 3-D position in the same way for all three (R19). A replayed drive keeps its recorded
+//! pointing: a point outside the image is rejected with the angles that would centre it, and mast angles other than those
+//! of the stop's image refer to another image, so that the pixel is rejected.
 //!
-//! A point that is given in three dimensions need not lie on the surface that stereo sees: how far it lies beside it
-//! is [`Named::gap_m`].
+//! A given 3-D point need not be on the surface that stereo measures: [`Named::gap_m`] is the distance between them.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -27,17 +26,17 @@ use sightline_track::trace::StepTrace;
 /// Mast angles that differ by less name the same image: the mast's resolution (domain.md 4.4), rad.
 const SAME_ANGLES_RAD: f64 = 0.1 * std::f64::consts::PI / 180.0;
 
-/// What a person says of a target; exactly one of pixel and points is given.
+/// A target as specified by the user; exactly one of pixel and points is given.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Place {
-    /// The pair of the stop in which it is designated and tracked; left out: the main pair.
+    /// The pair of the stop in which it is designated and tracked; the main pair if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<CameraName>,
     /// Its position in the left image, px.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pixel: Option<Pixel>,
-    /// The mast angles at which that image was taken; left out: those of the stop.
+    /// The mast angles at which that image was taken; those of the stop if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mast: Option<MastAngles>,
     /// Its position in the rover frame of the stop, m.
@@ -48,17 +47,17 @@ pub struct Place {
     pub point_in_site: Option<[f64; 3]>,
 }
 
-/// A place brought to a pixel.
+/// A target specification converted to a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Named {
     /// The stop and the pixel.
     pub designation: Designation,
-    /// The point that was given, in the rover frame of the stop, m.
+    /// The given point in the rover frame of the stop, m; `None` if a pixel was given.
     pub point_in_rover: Option<Point3>,
 }
 
 impl Named {
-    /// How far the surface that stereo found lies from the point that was given, m; null for a pixel.
+    /// Distance between the point that stereo found and the given point, m; `None` for a pixel.
     pub fn gap_m(&self, first: &StepTrace) -> Option<f64> {
         self.point_in_rover.map(|point| (first.update.target.position_in_rover - point).norm())
     }
@@ -70,11 +69,11 @@ impl Place {
         Self { pixel: Some(pixel), ..Self::default() }
     }
 
-    /// The pixel that this names in the left image of `step`.
+    /// Converts to a pixel of the left image of `step`.
     ///
     /// # Errors
-    /// [`Error::Target`] when nothing or more than one thing is given, the stop or its pair does not exist, the point is not
-    /// in the picture, or the pixel is one of another image.
+    /// [`Error::Target`] if not exactly one of pixel and points is given, the stop or its pair does not exist,
+    /// the point is outside the image, or the pixel is one of another image.
     pub fn name(&self, stops: &dyn Stops, step: usize) -> Result<Named> {
         let count = stops.stop_count();
         if step >= count {
@@ -140,7 +139,7 @@ impl Place {
         if let Some(pixel) = pixel {
             return Ok((pixel, Some(point)));
         }
-        // The mast is pointed for the main pair alone.
+        // The mast is pointed for the main pair only.
         let mast = stops.mast().filter(|_| self.camera.is_none());
         let centring = mast.and_then(|mast| mast.point_left_centre_at(&point));
         let hint = centring.map_or_else(String::new, |angles| {
@@ -175,7 +174,7 @@ mod tests {
         };
         let taken = Some(MastAngles { azimuth_rad: 3.13, elevation_rad: -0.2 });
         assert!(place(3.1302).check_angles(taken, 4).is_ok());
-        // The same direction, a turn further.
+        // The same direction, one revolution further.
         assert!(place(3.1302 - std::f64::consts::TAU).check_angles(taken, 4).is_ok());
         let message = place(3.0).check_angles(taken, 4).unwrap_err().to_string();
         assert!(message.contains("step 4") && message.contains("another image"), "{message}");

@@ -1,7 +1,7 @@
 //! The stereo pair of a stop in which a target is tracked: the main one, or a further pair by its name.
 //!
-//! For the stages: the cameras of that pair, its mast angles and its images. A stop that lacks the pair is no reason to end
-//! a run; the sentence here becomes the fault of that step.
+//! For the stages: the cameras of that pair, its mast angles and its images. A stop that lacks the pair does not end a
+//! run; the error here becomes the fault of that step.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use sightline_vision::image::GrayImage;
 
 use crate::pipeline::Stops;
 
-/// A stereo pair of a stop as the stages see it.
+/// A stereo pair of a stop, as input of the stages.
 #[derive(Clone, Copy, Debug)]
 pub struct StopPair<'a> {
     /// The left camera in the rover frame.
@@ -45,7 +45,7 @@ pub struct FurtherCamera<'a> {
 pub type FurtherImages = (Arc<GrayImage>, Option<Arc<GrayImage>>);
 
 impl StopPair<'_> {
-    /// The pair as it was pointed.
+    /// The pointing of the pair.
     pub(crate) fn pointing<'a>(
         &'a self,
         stops: &'a dyn Stops,
@@ -63,7 +63,7 @@ impl StopPair<'_> {
     }
 }
 
-/// The pair of a stop: the main one, or that of a name.
+/// The pair of a stop: the main one, or the one of this name.
 ///
 /// # Errors
 /// A stop without a pair of this name.
@@ -93,17 +93,17 @@ pub fn capture(
     }
 }
 
-/// The refusal of a stop that has no camera of this name.
+/// The error for a stop without a camera of this name.
 pub fn missing(step: usize, name: CameraName) -> Error {
     Error::Request(format!("stop {step} has no pair `{name}`"))
 }
 
-/// The refusal of a stop whose camera of this name is a single one.
+/// The error for a stop whose camera of this name is a single one.
 pub fn single(step: usize, name: CameraName) -> Error {
     Error::Request(format!("stop {step} has only a single image of `{name}`"))
 }
 
-/// The refusal of a pair as that of a designation in it.
+/// Converts the error of a pair to that of a designation in it.
 pub(crate) fn as_target(error: Error) -> Error {
     match error {
         Error::Request(sentence) => Error::Target(sentence),

@@ -1,11 +1,11 @@
-//! One step, on one page: the six stages in running order, from values to a value.
+//! One step, on one page: the six stages in order, as a pure function.
 //!
 //! ```text
 //! designate:   capture → locate (stereo only) → target
 //! run_step:    predict → point_mast → capture → locate → judge → update
 //! ```
-//! The comparison with the truth is not a stage: `session::track` adds it to the record.
-//! Everything is a function of the traverse, the target as the last stop left it, and the settings: going back is a read.
+//! The comparison with the ground truth is not a stage: `session::track` adds it to the record. Everything is a function
+//! of the traverse, the target after the previous stop, and the settings: going back is a read.
 
 use std::borrow::Cow;
 
@@ -31,9 +31,9 @@ use crate::pair::{self, FurtherCamera, FurtherImages, StopPair};
 use crate::sight::{is_another_look, not_searched, pointing};
 use crate::visual_odometry::{MeasuredMotion, pose_change_error};
 
-/// The stops of a drive, as the stages see them.
+/// The stops of a drive, as input of the stages.
 pub trait Stops {
-    /// How many stops there are.
+    /// Number of stops.
     fn stop_count(&self) -> usize;
     /// Time since the first stop, s.
     fn time_s(&self, step: usize) -> f64;
@@ -41,46 +41,46 @@ pub trait Stops {
     fn site_from_rover(&self, step: usize) -> Pose;
     /// The left and right camera in the rover frame, at the pointing in use.
     fn cameras(&self, step: usize) -> (&Camera, &Camera);
-    /// The mast, where it is known.
+    /// The mast, if known.
     fn mast(&self) -> Option<&Mast>;
-    /// The mast angles in use.
+    /// The mast angles in use; `None` if unknown or without a mast.
     fn mast_angles(&self, step: usize) -> Option<MastAngles>;
     /// The error model of the pose estimates by wheels, gyro and accelerometers.
     fn odometry_error(&self) -> OdometryError;
-    /// How vision measured the motion to a stop; `None` where it did not.
+    /// Visual odometry's measurement of the motion to a stop; `None` without one.
     fn measured_motion(&self, _step: usize) -> Option<&MeasuredMotion> {
         None
     }
-    /// Whether visual odometry runs alone at a stop of a drive: the tracker does not look for its target there.
+    /// Whether only visual odometry runs at a stop of a drive: the tracker does not search for its target there.
     fn is_odometry_alone(&self, _step: usize) -> bool {
         false
     }
-    /// Whether the cameras on the mast gave no images at a stop.
+    /// Whether the cameras on the mast delivered no images at a stop.
     fn has_dropped_out(&self, _step: usize) -> bool {
         false
     }
-    /// The target at which the mast was pointed at a stop; `None` where it was pointed at none, or nobody knows.
+    /// The target at which the mast was pointed at a stop; `None` if there was none or it is unknown.
     fn mast_target(&self, _step: usize) -> Option<Designation> {
         None
     }
-    /// 1σ error of each mast angle, deg; 0 where it is not known.
+    /// 1σ error of each mast angle, deg; 0 if unknown.
     fn pointing_error_deg(&self) -> f64;
-    /// How the two images of a stop relate.
+    /// Geometric relation of the two images of a stop.
     fn stereo(&self) -> StereoGeometry;
-    /// Where the targets of the traverse keep what they share, and which stop of the recording this one is.
+    /// The store of results shared by the targets of the traverse, with this stop's index in the recording.
     fn shared(&self, _step: usize) -> Option<Shared<'_>> {
         None
     }
     /// The stereo pair.
     ///
     /// # Errors
-    /// A sentence that names the missing or damaged file, or [`Error::Cancelled`] soon after `cancel` is requested.
+    /// An error that names the missing or damaged file, or [`Error::Cancelled`] soon after `cancel` is requested.
     fn capture(&self, step: usize, cancel: Cancel<'_>) -> Result<StereoPair>;
     /// The cameras of a stop beside its main pair.
     fn further_cameras(&self, _step: usize) -> Vec<FurtherCamera<'_>> {
         Vec::new()
     }
-    /// The images of such a camera; `None` where they cannot be read, or would have to be rendered first.
+    /// The images of such a camera; `None` if they cannot be read, or would have to be rendered first.
     fn images_at_hand(&self, _step: usize, _name: CameraName) -> Option<FurtherImages> {
         None
     }
@@ -108,7 +108,7 @@ pub fn designate(stops: &dyn Stops, designation: Designation, settings: &Setting
     designate_until(stops, designation, settings, Cancel::default())
 }
 
-/// [`designate`], which ends soon after `cancel` is requested.
+/// [`designate`], cancellable.
 ///
 /// # Errors
 /// As [`designate`], and [`Error::Cancelled`].
@@ -147,7 +147,7 @@ pub fn designate_until(
     })
 }
 
-/// Finds the position of a designated pixel by the tracker of the settings.
+/// Finds the position of a designated pixel with the tracker of the settings.
 fn designated(
     stops: &dyn Stops,
     designation: Designation,
@@ -174,34 +174,34 @@ fn designated(
     Ok((capture, located, memory))
 }
 
-/// One later step of a run: what `last` left behind is found again at the next stop.
+/// One later step of a run: finds the target `last` again at the next stop.
 pub fn run_step(stops: &dyn Stops, last: &Updated, settings: &Settings) -> StepTrace {
     computed_step(stops, last, settings, &StepChanges::default(), Cancel::default())
 }
 
-/// How a person interferes with a step, or watches it.
+/// Changes and callbacks of a step that the user requests.
 #[derive(Clone, Copy, Default)]
 pub struct StepChanges<'a> {
-    /// Pixel of the left image at which the prediction is put, px; `None`: where dead reckoning has it.
+    /// Pixel of the left image to which the prediction is moved, px; `None` for dead reckoning's.
     pub prediction_px: Option<Pixel>,
-    /// The stage from which on nothing is computed, from `point_mast` to `update`; `None`: the whole step.
+    /// First stage that is not computed, from `point_mast` to `update`; `None` for the whole step.
     pub before: Option<CycleStage>,
-    /// Called at the end of every stage, for its time; stages have no clock.
+    /// Called at the end of every stage, to measure its time; stages have no clock.
     pub ended: Option<&'a dyn Fn(CycleStage)>,
 }
 
 impl StepChanges<'_> {
-    /// Tells the end of a stage; whether the step is paused after it.
+    /// Reports the end of a stage; returns whether the step is paused after it.
     fn end(&self, stage: CycleStage) -> bool {
         self.ended.iter().for_each(|ended| ended(stage));
         stage.next().is_some_and(|next| self.before.is_some_and(|before| before <= next))
     }
 }
 
-/// The same, displaced or paused as a person asks for.
+/// [`run_step`] with a displaced prediction, or paused.
 ///
-/// The step paused before a stage has the results of the whole step's earlier stages. Neither the mast nor the images of the stop
-/// are used before their stages. A stop with damaged files is whole after `capture`.
+/// A step paused before a stage has the results of the whole step's earlier stages. The mast and the images of the stop
+/// are not used before their stages. A stop with damaged files is complete after `capture`.
 ///
 /// # Errors
 /// [`Error::Cancelled`] soon after `cancel` is requested.
@@ -218,7 +218,7 @@ pub fn run_step_changed(
     Ok(trace)
 }
 
-/// The step; anything once `cancel` is requested.
+/// The step; its value is meaningless once `cancel` is requested.
 fn computed_step(
     stops: &dyn Stops,
     last: &Updated,
@@ -280,7 +280,7 @@ fn computed_step(
     StepTrace { step, time_s, point_mast: pointing, kind, update }
 }
 
-/// Where the target should be at the next stop, perhaps displaced to a pixel of the left camera of its pair.
+/// The predicted target at the next stop, or displaced to a pixel of the left camera of its pair.
 fn prediction(
     stops: &dyn Stops,
     target: &Target,
@@ -295,9 +295,8 @@ fn prediction(
 
 /// The target with a memory of the settings' tracker.
 ///
-/// A run may change its tracker on the way. The new one cannot read the other's memory; it begins with its own of the
-/// designation, and keeps the position that the other one left. Where it finds no position there, the memory stays, and
-/// with it the tracker.
+/// A run may change its tracker on the way. The new one cannot read the other's memory: it starts with the memory of a new
+/// designation, and keeps the position from the other one. If it finds no position there, memory and tracker stay.
 fn with_own_memory<'a>(
     stops: &dyn Stops,
     target: &'a Target,
@@ -313,7 +312,7 @@ fn with_own_memory<'a>(
     }
 }
 
-/// The target that a designation makes.
+/// The target created by a designation.
 fn first_target(
     stops: &dyn Stops,
     designation: Designation,
@@ -350,7 +349,7 @@ fn first_target(
     })
 }
 
-/// The designated pixel, if the left image has it.
+/// The designated pixel, if it is inside the left image.
 fn check_pixel(designation: Designation, left: &Camera) -> Result<Pixel> {
     let pixel = designation.pixel;
     if pixel.x.is_finite() && pixel.y.is_finite() && pixel.is_inside(left.width(), left.height()) {
@@ -365,15 +364,15 @@ fn check_pixel(designation: Designation, left: &Camera) -> Result<Pixel> {
     )))
 }
 
-/// A stop among those of its drive.
+/// The position of a stop in its drive.
 fn place(stops: &dyn Stops, step: usize, designation: Designation, settings: &Settings) -> Place {
     let share = settings.limits.same_camera_focal_share;
     let left = |step: usize| pair::of_stop(stops, step, designation.camera).ok().map(|pair| pair.left);
-    // A stop that lacks the pair changes nothing.
+    // A stop that lacks the pair does not count as a change.
     let changes =
         |from: usize, to: usize| left(from).zip(left(to)).is_some_and(|(a, b)| !is_same_pair(a, b, share));
     let is_last = step + 1 >= stops.stop_count();
-    // Where the mast was pointed at a target, the rover was driven: which stop will be the last is not known there.
+    // If the mast was pointed at a target, the drive is a commanded one, whose last stop is not known in advance.
     let is_last_of_pair = match stops.mast_target(step) {
         Some(_) => is_another_look(stops, step, designation),
         None => is_last || changes(step, step + 1),
@@ -381,7 +380,7 @@ fn place(stops: &dyn Stops, step: usize, designation: Designation, settings: &Se
     Place { step, is_hand_over: step > 0 && changes(step - 1, step), is_last_of_pair }
 }
 
-/// Whether two left cameras are the same one, however it points: equal image size and kind of model, focal lengths that
+/// Whether two left cameras are the same one, regardless of pointing: equal image size and model, focal lengths that
 /// differ by less than `share`.
 fn is_same_pair(a: &Camera, b: &Camera, share: f64) -> bool {
     let focal_px = |camera: &Camera| camera.model.focal_length_px(camera.centre_pixel());

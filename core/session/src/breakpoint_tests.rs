@@ -1,4 +1,4 @@
-//! Breakpoints and queries of a session: what they hit, that steps are looked at once, and what is saved.
+//! Breakpoints and queries of a session: their hits, that each step is evaluated once, and their saved form.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use crate::track;
 use sightline_geometry::frames::Pose;
 use sightline_testing::{PlaneWorld, Trouble};
 
-/// A target whose run has lost the covered stop 2 of five, and a fork from stop 3 on.
+/// A session with one target over five stops; its run is lost at stop 2, where the cameras are covered.
 fn session() -> Session {
     let mut world =
         PlaneWorld::new((0..5).map(|k| Pose::translation(0.3 * f64::from(k), 0.0, 0.0)).collect());
@@ -130,7 +130,7 @@ fn a_query_gives_hits_values_and_unit_of_every_run() {
     let mut session = session();
     session.fork(0, 0, 3, &Changes::new(), None).unwrap();
     let answer = ask(&Expression::read("ncc < 0.6 or step > 2").unwrap(), &session.steps_of(None), true);
-    // The covered stop scores nothing, in both runs.
+    // At the covered stop the score is below the limit in both runs.
     assert_eq!((answer.count, answer.runs[0].hits.as_slice()), (4, &[2, 3, 4][..]));
     assert_eq!(answer.runs[0].values, [0.0, 0.0, 1.0, 1.0, 1.0].map(Some));
     assert_eq!((answer.runs[1].steps, answer.runs[1].hits.as_slice()), (3, &[2][..]));

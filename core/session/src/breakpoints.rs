@@ -1,7 +1,7 @@
-//! Breakpoints: conditions that are looked for at all steps of all runs of a session at once.
+//! Breakpoints: conditions that are evaluated at all steps of all runs of a session.
 //!
-//! Steps are never changed once they are recorded, so that a step is evaluated once; a condition that compares runs
-//! waits until all of them have come to a step. What a person set is saved with the session; what was hit is not.
+//! Recorded steps never change, so each step is evaluated once. A condition that compares runs is evaluated at a step once
+//! all of them have reached it. Breakpoints are saved with the session; their hits are not.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -14,10 +14,10 @@ use super::{Run, Session};
 use crate::step::RunStep;
 use sightline_geometry::error::{Error, Result};
 
-/// How many breakpoints a session may have.
+/// Maximum number of breakpoints of a session.
 pub const BREAKPOINT_LIMIT: usize = 64;
 
-/// A condition that a person set.
+/// A breakpoint as saved.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Breakpoint {
@@ -25,11 +25,11 @@ pub struct Breakpoint {
     pub number: usize,
     /// The condition.
     pub expression: String,
-    /// Whether it is looked for.
+    /// Whether it is evaluated.
     pub on: bool,
 }
 
-/// Where a condition is true in one run.
+/// The stops of one run at which a condition is true.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct RunHits {
     /// The target's number.
@@ -40,20 +40,20 @@ pub struct RunHits {
     pub steps: Vec<usize>,
 }
 
-/// A breakpoint with everything that it hit so far.
+/// A breakpoint with all hits so far.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct BreakpointView {
     /// Its number in paths.
     pub number: usize,
     /// The condition.
     pub expression: String,
-    /// Whether it is looked for.
+    /// Whether it is evaluated.
     pub on: bool,
-    /// Steps in all runs at which it is true; 0 while it is off.
+    /// Number of steps of all runs at which it is true; 0 while it is off.
     pub count: usize,
-    /// Those steps, run by run; runs without any are left out.
+    /// These steps by run; runs without hits are left out.
     pub hits: Vec<RunHits>,
-    /// What is wrong with its expression, where this version of the program cannot read it.
+    /// The error of its expression, if this version of the program cannot read it; null otherwise.
     pub problem: Option<Refused>,
 }
 
@@ -64,19 +64,19 @@ pub struct NewBreakpoint {
     /// The condition.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expression: Option<String>,
-    /// The stop to break at, which is the condition `step == …`.
+    /// The stop to break at; the condition becomes `step == …`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub step: Option<usize>,
 }
 
-/// Changes a breakpoint; what is left out stays.
+/// Changes a breakpoint; fields that are left out stay unchanged.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BreakpointChange {
     /// The new condition.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expression: Option<String>,
-    /// Whether it is looked for.
+    /// Whether it is evaluated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub on: Option<bool>,
 }
@@ -88,7 +88,7 @@ pub struct Breakpoints {
     last_number: Option<usize>,
 }
 
-/// A breakpoint with what it hit.
+/// A breakpoint with its hits by target and run.
 #[derive(Clone, Debug)]
 struct Watched {
     breakpoint: Breakpoint,
@@ -96,10 +96,10 @@ struct Watched {
     caught: BTreeMap<(usize, usize), Caught>,
 }
 
-/// What a breakpoint hit in one run.
+/// The hits of a breakpoint in one run.
 #[derive(Clone, Debug, Default)]
 struct Caught {
-    /// Steps that were evaluated.
+    /// Number of steps evaluated so far.
     looked_at: usize,
     steps: Vec<usize>,
 }
@@ -112,13 +112,13 @@ impl Watched {
 }
 
 impl Breakpoints {
-    /// Those of a saved session.
+    /// The breakpoints of a saved session.
     pub(super) fn restored(saved: &[Breakpoint]) -> Self {
         let last_number = saved.iter().map(|breakpoint| breakpoint.number).max();
         Self { set: saved.iter().cloned().map(Watched::new).collect(), last_number }
     }
 
-    /// What the person set.
+    /// The breakpoints as they are saved.
     pub fn list(&self) -> Vec<Breakpoint> {
         self.set.iter().map(|watched| watched.breakpoint.clone()).collect()
     }
@@ -140,7 +140,7 @@ impl Breakpoints {
         Ok(number)
     }
 
-    /// Looks at the steps of a target's runs that were not looked at yet.
+    /// Evaluates all conditions at the steps of a target's runs that were not evaluated yet.
     fn look(&mut self, target: usize, runs: &[&[Arc<RunStep>]]) {
         for watched in self.set.iter_mut().filter(|watched| watched.breakpoint.on) {
             let Ok(expression) = &watched.expression else { continue };
@@ -152,7 +152,7 @@ impl Breakpoints {
                 let caught = watched.caught.entry((target, run)).or_default();
                 let settled = settled(runs, steps, compared);
                 if caught.looked_at > settled {
-                    // The run was begun anew.
+                    // The run was restarted.
                     *caught = Caught::default();
                 }
                 let hit = (caught.looked_at..settled).filter(|&index| expression.is_true(runs, run, index));
@@ -185,7 +185,7 @@ impl Breakpoints {
     }
 }
 
-/// How many of a run's steps cannot change their answer any more.
+/// Number of a run's steps at which the condition's value is final: all compared runs have reached them.
 fn settled(runs: &[&[Arc<RunStep>]], steps: &[Arc<RunStep>], compared: &[usize]) -> usize {
     let end = |run: &usize| runs.get(*run).and_then(|steps| steps.last()).map_or(0, |last| last.step + 1);
     match compared.iter().map(end).min() {
@@ -198,7 +198,7 @@ impl Session {
     /// Sets a breakpoint and returns its number; one with the same condition is switched on instead.
     ///
     /// # Errors
-    /// [`Refused`] by a bad condition, or when there are too many already.
+    /// [`Refused`] for an invalid condition, or if there are too many breakpoints.
     pub fn add_breakpoint(&mut self, expression: &str) -> std::result::Result<usize, Refused> {
         if self.breakpoints.set.len() >= BREAKPOINT_LIMIT {
             let sentence = format!("a session may have {BREAKPOINT_LIMIT} breakpoints: remove one first");
@@ -210,7 +210,7 @@ impl Session {
     /// Gives a breakpoint another condition.
     ///
     /// # Errors
-    /// [`Refused`] by a bad condition; the breakpoint stays as it was.
+    /// [`Refused`] for an invalid condition; the breakpoint stays unchanged.
     pub fn change_breakpoint(&mut self, number: usize, expression: &str) -> std::result::Result<(), Refused> {
         Expression::condition(expression)?;
         if let Some(watched) = self.breakpoints.set.iter_mut().find(|w| w.breakpoint.number == number) {
@@ -223,7 +223,7 @@ impl Session {
     /// Switches a breakpoint on or off.
     ///
     /// # Errors
-    /// [`Error::Request`] when there is none of that number.
+    /// [`Error::Request`] if there is no breakpoint with this number.
     pub fn switch_breakpoint(&mut self, number: usize, on: bool) -> Result<()> {
         let found = self.breakpoints.set.iter_mut().find(|watched| watched.breakpoint.number == number);
         found.ok_or_else(|| no_breakpoint(number))?.breakpoint.on = on;
@@ -233,7 +233,7 @@ impl Session {
     /// Removes a breakpoint.
     ///
     /// # Errors
-    /// [`Error::Request`] when there is none of that number.
+    /// [`Error::Request`] if there is no breakpoint with this number.
     pub fn remove_breakpoint(&mut self, number: usize) -> Result<()> {
         self.breakpoint(number)?;
         self.breakpoints.set.retain(|watched| watched.breakpoint.number != number);
@@ -243,13 +243,13 @@ impl Session {
     /// A breakpoint.
     ///
     /// # Errors
-    /// [`Error::Request`] when there is none of that number.
+    /// [`Error::Request`] if there is no breakpoint with this number.
     pub fn breakpoint(&self, number: usize) -> Result<&Breakpoint> {
         let found = self.breakpoints.set.iter().find(|watched| watched.breakpoint.number == number);
         found.map(|watched| &watched.breakpoint).ok_or_else(|| no_breakpoint(number))
     }
 
-    /// All breakpoints with everything that they hit so far; only steps that are new since the last time are evaluated.
+    /// All breakpoints with all hits so far; evaluates only the steps added since the last call.
     pub fn breakpoint_views(&mut self) -> Vec<BreakpointView> {
         for (number, target) in self.targets.iter().enumerate().filter(|(_, target)| !target.removed) {
             let runs: Vec<&[Arc<RunStep>]> = target.runs.iter().map(Run::whole_steps).collect();

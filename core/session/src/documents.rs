@@ -1,16 +1,17 @@
-//! Small documents that a person keeps beside the sessions: arrangements of panels, conditions to stop at, and the like.
+//! Small documents that a person stores beside the sessions: panel layouts, lists of breakpoints and others.
 //!
-//! The server does not look into them. Each has a name and a revision; who replaces one says which revision was read.
+//! The server does not interpret them. Each has a name and a revision; a request that replaces one names the revision that
+//! it read.
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use utoipa::ToSchema;
 
-/// How many documents there may be.
+/// Maximum number of documents.
 pub const DOCUMENT_LIMIT: usize = 200;
-/// How large a document may be, bytes of JSON.
+/// Maximum size of a document, bytes of JSON.
 pub const DOCUMENT_BYTES: usize = 256 << 10;
-/// How many characters a name may have.
+/// Maximum length of a name, bytes.
 const NAME_LIMIT: usize = 64;
 
 /// A document.
@@ -18,14 +19,14 @@ const NAME_LIMIT: usize = 64;
 pub struct Document {
     /// Its name in paths.
     pub name: String,
-    /// Raised by every change; what `If-Match` names.
+    /// Increased by every change; the value for `If-Match`.
     pub revision: u64,
-    /// What it holds.
+    /// The content.
     #[schema(value_type = Value)]
     pub value: Value,
 }
 
-/// Whether a text can name a document: small letters, digits, hyphens, underscores and dots, beginning with a letter.
+/// Whether a text can name a document: lower-case ASCII letters, digits, hyphens, underscores and dots; first a letter.
 pub fn is_name(text: &str) -> bool {
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "-_.".contains(c);
     text.len() <= NAME_LIMIT && text.starts_with(|c: char| c.is_ascii_lowercase()) && text.chars().all(plain)

@@ -1,6 +1,6 @@
-//! The targeted drive of a session with its comparison against the truth: who drives, the decisions, the outcome.
+//! The targeted drive of a session and its comparison with the truth: the driving run, the decisions, the outcome.
 //!
-//! The loop of `sightline_rover::driving` sees estimates alone: leaving the comparison out changes no bit of it.
+//! The loop of `sightline_rover::driving` uses estimates alone; the comparison has no influence on it.
 
 use std::sync::Arc;
 
@@ -25,7 +25,7 @@ use sightline_world::World;
 use sightline_world::scenario::Fault;
 use sightline_world::target_truth::{TargetTruth, TruthSource};
 
-/// Who drives in a session, and how: the run on whose estimates the rover moves, and its command.
+/// The run on whose estimates the rover of a session drives, and its command.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Steering {
@@ -36,13 +36,13 @@ pub struct Steering {
     /// The command.
     #[serde(default)]
     pub command: DriveCommand,
-    /// The targets to which the rover drives afterwards, in this order, by their numbers; each with its newest run.
+    /// Numbers of the targets to which the rover drives afterwards, in this order; each with its newest run.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub then: Vec<usize>,
-    /// The stop at which the rover waits; null: it drives on. A later stop counts if the rover has left this one already.
+    /// The stop at or after which the drive pauses; null for none.
     #[serde(default)]
     pub pause_at: Option<usize>,
-    /// The stage of that stop before or after which the rover waits; null: before `drive`, once the target is located.
+    /// Pause before or after a stage of that stop; null: before `drive`, once the target is located.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pause: Option<StagePause>,
 }
@@ -50,9 +50,9 @@ pub struct Steering {
 /// A drive as pages and scripts see it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct DriveView {
-    /// Who drives, and how; null before the first command.
+    /// The driving run and its command; null before the first command.
     pub steering: Option<Steering>,
-    /// The decisions at the stops that the run has come to, made on its own estimates.
+    /// The decisions at the stops that the run has reached, made on its own estimates.
     pub cycles: Vec<Cycle>,
     /// The visits that have ended, of a drive to several targets.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -60,14 +60,14 @@ pub struct DriveView {
     /// The faults that were injected into the world.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub faults: Vec<Fault>,
-    /// The outcome so far, for the present target; null before the first command.
+    /// The outcome so far, for the current target; null before the first command.
     pub summary: Option<DriveSummary>,
-    /// Why the drive stopped; null while it goes on, and where it has arrived.
+    /// Why the drive stopped; null while it goes on, and after arrival.
     #[serde(default)]
     pub why: Option<StopExplanation>,
-    /// Whether the next stop is being computed, or waits for it.
+    /// Whether the next stop is being computed or queued.
     pub is_driving: bool,
-    /// The place at which the drive waits; null while it drives, once it has ended, and where its run was stopped.
+    /// Stop and stage at which the drive is paused; null while it drives, after its end, and if its run was stopped.
     #[serde(default)]
     pub paused: Option<Halt>,
 }
@@ -98,19 +98,19 @@ impl DriveView {
 /// The outcome of a drive.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct DriveSummary {
-    /// Stops, the first included.
+    /// Number of stops, the first included.
     pub stops: usize,
-    /// Whether the rover believes to have arrived.
+    /// Whether the rover has arrived by its own estimate.
     pub arrived: bool,
     /// Why it stopped; null while it drives.
     pub reason: Option<StopReason>,
     /// Distance between the estimated and the true target in the rover frame at the last stop, m; null without truth.
     pub target_error_m: Option<f64>,
-    /// Horizontal distance of the true rover from the goal that follows from the true target, m; null without truth.
+    /// Horizontal distance of the true rover from the goal computed from the true target, m; null without truth.
     pub goal_error_m: Option<f64>,
     /// Length of the wheels' path, m.
     pub driven_m: f64,
-    /// Steps that a rock ended, and stops at which a rock reaches into the rover's body.
+    /// Number of steps that a rock ended, and of stops at which a rock intersects the rover's body.
     pub collisions: u32,
     /// Whether the target was tracked at the last stop; null without truth.
     pub tracked: Option<bool>,
@@ -118,11 +118,11 @@ pub struct DriveSummary {
     pub flight_minutes: f64,
 }
 
-/// Refuses a command that makes no sense for a target where it was designated.
+/// Checks a command against the target at its designation.
 ///
 /// # Errors
-/// [`Error::Setting`] as [`DriveCommand::validate_for`], for a navigator whose pair is missing, for a goal outside the ground of a simulated world, and for a tilt limit
-/// that the rover exceeds where it stands.
+/// [`Error::Setting`] as [`DriveCommand::validate_for`], for a navigator whose hazard pair is missing, for a goal outside
+/// the ground of a simulated world, and for a tilt limit that the rover already exceeds.
 pub(crate) fn check_command(traverse: &Traverse, command: &DriveCommand, first: &StepTrace) -> Result<()> {
     let target = &first.update.target;
     command.validate_for(&target.position_in_rover)?;
@@ -159,11 +159,11 @@ pub(crate) fn check_command(traverse: &Traverse, command: &DriveCommand, first: 
     Err(Error::setting("offset_m", problem))
 }
 
-/// The decisions at the stops of a run: those that the rover followed, and under the command where it has not driven on.
+/// The decisions at the stops of a run: recorded ones where the rover followed them, computed ones elsewhere.
 ///
-/// Decisions that were followed for another target, or are not known, are made again under the command: they show where the run
-/// would have gone. `maps` keeps the hazard maps for the next call; those that are missing are computed, and a missing image of
-/// their pair is rendered.
+/// Decisions that are unknown, or were followed for another target, are made again under the command: they show where the
+/// run would have driven. `maps` caches the hazard maps; missing maps are computed, and missing images of their pair
+/// rendered.
 fn cycles(
     world: &DrivenTraverse,
     command: &DriveCommand,
@@ -175,7 +175,7 @@ fn cycles(
     let navigator = &*command.navigator.navigator();
     let designation = first.trace.update.target.designation;
     for step in steps {
-        // Before it was sent to this target, the rover drove to others.
+        // Before `since` the rover drove to other targets.
         let is_own = |known: &&Followed| {
             known.designation == designation || command.since.is_some_and(|since| step.step < since)
         };
@@ -186,7 +186,7 @@ fn cycles(
         let before = cycles.last().map(|last| towards_goal(world, command, last.clone()));
         let before = before.as_ref();
         let (first, last) = (&first.trace, &step.trace);
-        // Never cancelled.
+        // The default is never cancelled.
         let hazards = maps.at(world.traverse(), command, [first, last], Cancel::default()).ok().flatten();
         let input = CycleInput { command, navigator, first, last, before, hazards: hazards.as_deref() };
         let mut cycle = executive::decide(world.traverse(), &input);
@@ -198,7 +198,7 @@ fn cycles(
     cycles
 }
 
-/// The decision before the next one at the last of a run's stops, `steps` being those before it.
+/// The decision at the last of `steps`, as the predecessor of the next decision.
 pub fn cycle_before(
     world: &DrivenTraverse,
     command: &DriveCommand,
@@ -208,7 +208,7 @@ pub fn cycle_before(
     cycles(world, command, steps, maps).pop().map(|last| towards_goal(world, command, last))
 }
 
-/// A decision as it counts for the next one: actions after arrival at another goal are left out.
+/// A decision as the predecessor of the next one: actions after arrival at another goal are not counted.
 fn towards_goal(world: &DrivenTraverse, command: &DriveCommand, mut cycle: Cycle) -> Cycle {
     if world.followed(cycle.step).is_some_and(|followed| !command.has_goal_of(&followed.command)) {
         (cycle.arrival_actions, cycle.motions_begun) = (0, 0);

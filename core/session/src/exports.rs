@@ -1,24 +1,24 @@
-//! What a session can be exported as, as pages and scripts see it.
+//! The files to which a session can be exported.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// A file that can be had.
+/// A file that can be exported.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ExportEntry {
     /// Its name in paths and on the command line.
     pub name: String,
-    /// What it is called in a menu.
+    /// Its title in menus.
     pub title: String,
-    /// What it holds and is good for.
+    /// Its contents and purpose.
     pub sentence: String,
-    /// The name under which it is saved.
+    /// The suggested file name.
     pub file: String,
-    /// How large it will be.
+    /// Its size, or an estimate.
     pub size: Size,
     /// Its path below `/api/v1/`, with the query.
     pub path: String,
-    /// The command line that makes the same file.
+    /// The command line that writes the same file.
     pub command: String,
 }
 
@@ -27,12 +27,12 @@ pub struct ExportEntry {
 pub struct Size {
     /// Bytes.
     pub bytes: u64,
-    /// Whether that is the size; otherwise it is an estimate.
+    /// Whether the size is exact; otherwise it is an estimate.
     pub is_exact: bool,
 }
 
 impl Size {
-    /// The size as a person reads it.
+    /// The size as text: `about 2.3 MB`.
     pub fn words(self) -> String {
         let about = if self.is_exact { "" } else { "about " };
         let bytes = self.bytes as f64;

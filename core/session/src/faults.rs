@@ -1,4 +1,4 @@
-//! Faults that a person injects into a drive (R208): as they are asked for, and as the world has them.
+//! Faults that a person injects into a drive (R208): the request, and its conversion to faults of the world.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -8,23 +8,23 @@ use sightline_track::target::Designation;
 use sightline_world::scenario::{Fault, FaultKind};
 use sightline_world::target_truth::{TargetTruth, TruthSource};
 
-/// A fault to be injected into a drive.
+/// A fault to inject into a drive.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewFault {
-    /// What goes wrong.
+    /// The kind of fault.
     pub kind: FaultKind,
-    /// The first stop at which it does; later than the one from which is driven.
+    /// The first stop of the fault; later than the stop from which the drive begins.
     pub from_stop: u32,
-    /// The last stop at which it does.
+    /// The last stop of the fault.
     pub to_stop: u32,
-    /// The number of the target that it concerns; left out: the one that is driven to first. Of no effect for a fault that concerns
+    /// The number of the affected target; default: the first target of the drive. Without effect for a fault that concerns
     /// no single target.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub target: Option<usize>,
 }
 
-/// The faults as the world has them: each with the true position of the target that it concerns, `driver` by default.
+/// Converts the faults to faults of the world, with the true position of the affected target, `driver` by default.
 ///
 /// # Errors
 /// [`Error::Setting`] for a target that does not exist.

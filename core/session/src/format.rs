@@ -1,17 +1,17 @@
-//! Numbers as text: the one rule of digits for the page, its explanations, plain pages and reports.
+//! Numbers as text: the common rule for digits in the viewer, explanations, plain pages and reports.
 //!
 //! | magnitude | digits | example |
 //! |---|---|---|
 //! | whole number below 10⁹ | all of them | `12` |
 //! | below 10⁻¹² | rounding of a computation, shown as zero | `0` |
-//! | below 10⁻³, or from 10⁷ on | three significant digits with an exponent | `1.20e-4` |
+//! | below 10⁻³, or at least 10⁷ | three significant digits with an exponent | `1.20e-4` |
 //! | below 1 | three significant digits | `0.0123` |
 //! | below 1000 | four significant digits | `123.5` |
 //! | below 10⁷ | one decimal | `1234.5` |
 //!
-//! Files for programs (CSV, JSON, Parquet) do not use this rule: they keep every digit.
+//! Files for programs (CSV, JSON, Parquet) do not use this rule: they contain all digits.
 
-/// Values smaller than this are rounding errors of a computation in metres or pixels.
+/// Values below this are rounding errors of a computation in metres or pixels.
 const ROUNDING: f64 = 1e-12;
 
 /// Formats a number by the rule of this module.
@@ -46,7 +46,7 @@ pub fn quantity(value: f64, unit: &str) -> String {
     }
 }
 
-/// Formats two numbers with as many digits as it takes to see that they differ.
+/// Formats two numbers with as many digits as are needed to distinguish them.
 pub(crate) fn distinct(a: f64, b: f64) -> [String; 2] {
     let plain = [number(a), number(b)];
     if plain[0] != plain[1] || a == b {

@@ -1,4 +1,4 @@
-//! The goodness map of a stop as pages and scripts see it.
+//! The goodness map of a stop as clients receive it.
 
 use serde::{Deserialize, Serialize};
 use sightline_rover::driving::{RangeData, StopHazards};
@@ -15,7 +15,7 @@ pub struct HazardView {
     pub step: usize,
     /// Number of points by stereo at this stop; null without range data.
     pub range_points: Option<usize>,
-    /// Why there are no range data; null where there are some.
+    /// Why there are no range data; null otherwise.
     pub missing: Option<String>,
     /// Side of a cell, m.
     pub cell_m: f64,
@@ -23,15 +23,15 @@ pub struct HazardView {
     pub side: usize,
     /// x and y of the corner with the least of both, site frame, m.
     pub corner_m: [f64; 2],
-    /// Goodness, from 0 (bad) to 100; −1 where it is unknown.
+    /// Goodness, from 0 (bad) to 100; −1 if it is unknown.
     pub goodness_percent: Vec<i8>,
     /// The term that limits the goodness; null for a cell of full goodness.
     pub limited_by: Vec<Option<HazardTerm>>,
     /// The value of that term: tilt in deg, roughness and step in m, certainty from 0 to 1.
     pub value: Vec<f32>,
-    /// Where the goodness comes from.
+    /// The basis of the goodness: measured, unknown, assumed or exempt.
     pub basis: Vec<CellBasis>,
-    /// Measured height, z of the site frame (down), m; null where too little was measured.
+    /// Measured height, z of the site frame (down), m; null if too few points were measured.
     pub height_m: Vec<Option<f32>>,
 }
 
@@ -58,7 +58,7 @@ impl HazardView {
                 .map(|cell| if cell.basis == CellBasis::Unknown { UNKNOWN } else { percent(cell.goodness) })
                 .collect(),
             limited_by: map.cells.iter().map(|cell| limiting(cell).map(|(term, _)| term)).collect(),
-            // Three decimals: the map is read, not computed with.
+            // Three decimals suffice for display.
             value: map
                 .cells
                 .iter()

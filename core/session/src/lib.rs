@@ -1,9 +1,9 @@
-//! One person's work on one traverse: targets, their runs, and the cursor. Without a network and without files.
+//! A session: one person's work on one traverse, with targets, their runs, and the cursor. No network, no files.
 //!
-//! A *run* is one configuration over one target. Its steps are recorded as they are computed, so that going
-//! back is a read. Changing a setting never overwrites: it forks a new run that shares the steps before the
-//! fork. What is worth keeping is small: [`Session::saved`] is the list of what the person did, from which
-//! the same session comes again bit for bit, since every step is a function of its input.
+//! A *run* is one configuration over one target. Its steps are recorded as they are computed, so that going back only reads.
+//! A changed setting never overwrites a run: it forks a new run that shares the steps before the fork. The saved form is
+//! small: [`Session::saved`] lists the person's actions. The session is recomputed from them bit for bit, because every step
+//! is a function of its input.
 
 pub mod counterfactual;
 pub mod documents;
@@ -59,28 +59,28 @@ use sightline_track::cycle_stage::CycleStage;
 use sightline_track::settings::{Changes, Settings};
 use sightline_track::target::Designation;
 
-/// What every panel is a view of.
+/// The selection that all panels show.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Cursor {
-    /// The target looked at, by its number; null before the first is picked.
+    /// The number of the selected target; null before the first designation.
     pub target: Option<usize>,
-    /// The run looked at, by its number within the target.
+    /// The number of the selected run within the target.
     pub run: usize,
-    /// The stop looked at.
+    /// The selected stop.
     pub step: usize,
 }
 
 /// A designated target with its runs.
 #[derive(Clone, Debug)]
 pub struct TargetRecord {
-    /// What the person calls it.
+    /// Its label.
     pub label: String,
-    /// How it was designated.
+    /// Its designation.
     pub designation: Designation,
-    /// Its runs; forks are later than what they forked from.
+    /// Its runs, by number; a fork has a larger number than its parent.
     pub runs: Vec<Run>,
-    /// Whether the person removed it; numbers of the others stay as they are.
+    /// Whether it was removed; the other targets keep their numbers.
     pub removed: bool,
 }
 
@@ -91,25 +91,25 @@ pub struct Session {
     pub id: String,
     /// The traverse's name in paths.
     pub traverse: String,
-    /// How many stops the traverse has.
+    /// Number of stops of the traverse.
     pub stop_count: usize,
     /// The targets, by number.
     pub targets: Vec<TargetRecord>,
-    /// What is looked at.
+    /// The current selection.
     pub cursor: Cursor,
-    /// The conditions that are looked for.
+    /// The breakpoints.
     pub breakpoints: Breakpoints,
-    /// Who drives; `None` where nobody was told to.
+    /// The driving run and its command; `None` before the first drive command.
     pub steering: Option<Steering>,
     /// The visits that have ended, of a drive to several targets.
     pub visits: Vec<visits::Visit>,
     /// The first stage for which the last stop of a paused drive is not ready: `point_mast` or `capture`; `None` if it is ready.
     pub awaits: Option<CycleStage>,
-    /// The removed targets that can be restored, the one removed last at the end.
+    /// The removed targets that can be restored, in order of removal.
     removals: VecDeque<usize>,
 }
 
-/// What a run needs for its next step.
+/// The inputs of the next step of a run.
 #[derive(Clone, Debug)]
 pub struct Pending {
     /// The designation.
@@ -118,7 +118,7 @@ pub struct Pending {
     pub last: Arc<RunStep>,
     /// The run's configuration.
     pub settings: Arc<Settings>,
-    /// Where a person put the prediction of the step in the left image, px.
+    /// The prediction of the step in the left image as displaced by a person, px; `None`: by dead reckoning.
     pub prediction_px: Option<Pixel>,
     /// The stage before which the step is paused; `None`: the whole step.
     pub before: Option<CycleStage>,
@@ -143,7 +143,7 @@ impl Session {
         }
     }
 
-    /// Adds a target whose designation was computed, and looks at it. Returns its number.
+    /// Adds a target whose designation was computed, and selects it. Returns its number.
     pub fn add_target(&mut self, label: Option<String>, settings: Settings, first: Arc<RunStep>) -> usize {
         let number = self.targets.len();
         let designation = first.update.target.designation;
@@ -157,18 +157,18 @@ impl Session {
     /// Renames a target.
     ///
     /// # Errors
-    /// [`Error::Request`] when there is no such target.
+    /// [`Error::Request`] if there is no such target.
     pub fn rename_target(&mut self, target: usize, label: &str) -> Result<()> {
         self.target_mut(target)?.label = target_label(target, label);
         Ok(())
     }
 
     /// Forks `run`: the steps before `from_step` are shared, the later ones are computed with changed settings.
-    /// At the designation's own step `redesignated` must hold the designation under the new settings.
+    /// At the step of the designation, `redesignated` must be the designation under the new settings.
     /// Returns the number of the new run.
     ///
     /// # Errors
-    /// [`Error::Request`] when there is no such target, run or step; [`Error::Setting`] for a bad change.
+    /// [`Error::Request`] if there is no such target, run or step; [`Error::Setting`] for an invalid change.
     pub fn fork(
         &mut self,
         target: usize,
@@ -194,10 +194,10 @@ impl Session {
         Ok(record.runs.len() - 1)
     }
 
-    /// What the next step of a run needs; none when the run is complete, stopped, or paused with its drive.
+    /// The inputs of the next step of a run; `None` if the run is complete, stopped, or paused with its drive.
     ///
     /// # Errors
-    /// [`Error::Request`] when there is no such target or run.
+    /// [`Error::Request`] if there is no such target or run.
     pub fn pending(&self, target: usize, run: usize) -> Result<Option<Pending>> {
         let run = self.any_run(target, run)?;
         let end = run.stop_after.map_or(self.stop_count, |stop| self.stop_count.min(stop + 1));
@@ -214,10 +214,10 @@ impl Session {
         }))
     }
 
-    /// Records the next step of a run, in the place of one that was paused; a step that does not follow the last one is refused.
+    /// Records the next step of a run; it replaces the last step if that was paused between stages.
     ///
     /// # Errors
-    /// [`Error::Request`] when there is no such target or run, or the step is not the next one.
+    /// [`Error::Request`] if there is no such target or run, or the step is not the next one.
     pub fn record(&mut self, target: usize, run: usize, trace: Arc<RunStep>) -> Result<()> {
         let run = self.run_mut(target, run)?;
         let expected = run.whole_steps().last().map(|last| last.step + 1);
@@ -229,10 +229,10 @@ impl Session {
         Ok(())
     }
 
-    /// Moves the cursor; going back is a read.
+    /// Moves the cursor.
     ///
     /// # Errors
-    /// [`Error::Request`] when it names what does not exist.
+    /// [`Error::Request`] if the target, run or stop does not exist.
     pub fn move_cursor(&mut self, cursor: Cursor) -> Result<()> {
         if let Some(target) = cursor.target {
             self.run(target, cursor.run)?;
@@ -251,7 +251,7 @@ impl Session {
     /// A target that was not removed.
     ///
     /// # Errors
-    /// [`Error::Request`] when there is none of that number.
+    /// [`Error::Request`] if there is none with this number.
     pub fn target(&self, target: usize) -> Result<&TargetRecord> {
         let found = self.targets.get(target).filter(|record| !record.removed);
         found.ok_or_else(|| Error::Request(format!("session {} has no target {target}", self.id)))
@@ -260,7 +260,7 @@ impl Session {
     /// A run of a target that was not removed.
     ///
     /// # Errors
-    /// [`Error::Request`] when there is none of that number.
+    /// [`Error::Request`] if there is none with this number.
     pub fn run(&self, target: usize, run: usize) -> Result<&Run> {
         let found = self.any_run(target, run).ok().filter(|found| !found.removed);
         found.ok_or_else(|| self.no_run(target, run))
@@ -273,7 +273,7 @@ impl Session {
     }
 }
 
-/// The label that was given, or `target` and the number from 1 if it is blank.
+/// The given label; if blank, `target` and the number from 1.
 fn target_label(number: usize, given: &str) -> String {
     let given = given.trim();
     if given.is_empty() { format!("target {}", number + 1) } else { given.to_owned() }

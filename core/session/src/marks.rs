@@ -1,5 +1,5 @@
-//! What a step draws over its two images: one list, which the page, the pictures of reports and Rerun recordings paint each in
-//! its own way.
+//! The marks of a step over its two images: one list, which the viewer, the figures of reports and Rerun recordings draw
+//! in their own styles.
 
 use nalgebra::{Matrix2, Vector2};
 use sightline_geometry::frames::Pixel;
@@ -9,10 +9,10 @@ use sightline_vision::image::PixelRect;
 
 use crate::step::RunStep;
 
-/// The meaning of a mark, from which a view takes its colour and stroke.
+/// The meaning of a mark; it determines colour and stroke.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum MarkName {
-    /// Left: the part of the image that was kept.
+    /// Left: the stored part of the image.
     Subframe,
     /// Left: the search window of the template.
     SearchWindow,
@@ -20,19 +20,19 @@ pub enum MarkName {
     PredictionGate,
     /// Left: the prediction.
     PredictedLeft,
-    /// Left: the rock's half width about the prediction; from farther off a registration may settle on another place (R155).
+    /// Left: the rock's half width about the prediction; with a larger error a registration may converge elsewhere (R155).
     Basin,
-    /// Left: the template's window after scale and roll, about the prediction.
+    /// Left: the template's window after scale and roll, centred on the prediction.
     PredictedWindow,
-    /// Left: the window that was compared with the template.
+    /// Left: the window that was matched with the template.
     MatchedWindow,
-    /// Left: the window of the reference image, carried to the match by scale and roll.
+    /// Left: the window of the reference image, transformed to the match by scale and roll.
     CarriedWindow,
     /// Left: the match of the template.
     Peak,
     /// Left: the second-best match of the template.
     SecondPeak,
-    /// Left: the error of the located position, bias included; at 1σ, 2σ and 3σ by features or shape (R180), else at 3σ.
+    /// Left: the error of the located position, bias included; at 1σ, 2σ and 3σ for features or shape (R180), else at 3σ.
     LocatedError,
     /// Left: the located position.
     LocatedLeft,
@@ -71,14 +71,14 @@ pub enum Shape {
         centre: Pixel,
         /// The covariance, px².
         covariance_px2: Matrix2<f64>,
-        /// The standard deviations, one a contour.
+        /// The multiples of σ, one for each contour.
         sigmas: &'static [f64],
     },
     /// A closed polygon.
     Outline(Vec<Pixel>),
     /// A rectangle of whole pixels.
     Rect(PixelRect),
-    /// A polyline; each position with its score, where it has one.
+    /// A polyline; each position with its score, if it has one.
     Curve(Vec<(Pixel, Option<f32>)>),
 }
 
@@ -149,7 +149,7 @@ pub fn basin_of(step: &RunStep) -> Option<(Vec<Pixel>, f64)> {
         .filter(|(outline, _)| !outline.is_empty())
 }
 
-/// The corners of a square window of `side_px` whole pixels about `centre`, carried by `image_from_window`.
+/// The corners of a square window of `side_px` whole pixels about `centre`, transformed by `image_from_window`.
 pub fn square(centre: Pixel, side_px: u32, image_from_window: &Matrix2<f64>) -> [Pixel; 4] {
     let half = f64::from(side_px) / 2.0;
     [(-half, -half), (half, -half), (half, half), (-half, half)].map(|(x, y)| {

@@ -1,4 +1,4 @@
-//! The memory that the steps of a session take, and giving it back: steps are computed again from what the person did.
+//! Memory of the steps of a session, and its release: steps can be recomputed from the saved session.
 
 use sightline_geometry::error::Result;
 use sightline_track::locate::store::HeapBytes;
@@ -6,13 +6,13 @@ use sightline_track::locate::store::HeapBytes;
 use crate::{Run, Session};
 
 impl Session {
-    /// The memory of all recorded steps, bytes, by the last step of each run; an upper bound, because runs of one target
-    /// share more than the steps before their forks.
+    /// The memory of all recorded steps, bytes, estimated from the last step of each run; an upper bound, because runs of
+    /// one target share more data than the steps before their forks.
     pub fn step_bytes(&self) -> usize {
         self.targets.iter().flat_map(|target| &target.runs).map(Run::step_bytes).sum()
     }
 
-    /// The same session without steps, as after a restart of the program: its runs are computed again.
+    /// The same session without steps, as after a restart of the program; its runs are recomputed.
     ///
     /// # Errors
     /// As [`Session::restored`].
@@ -22,7 +22,7 @@ impl Session {
 }
 
 impl Run {
-    /// The memory of the steps that are not shared with the run that this one left, bytes.
+    /// The memory of the steps that are not shared with the parent run, bytes.
     fn step_bytes(&self) -> usize {
         let Some((first, last)) = self.steps.first().zip(self.steps.last()) else { return 0 };
         let from = self.fork.map_or(0, |fork| fork.from_step).max(first.step);

@@ -1,9 +1,9 @@
-//! Notes of a session: what a person wrote about a place of the drive, in an order that can be walked through.
+//! Notes of a session: texts about steps of the drive, in an order that a person can change.
 //!
-//! A note is pinned to a step of the drive and, where there is one, to a run, a stage and a pixel of the left image. New notes
-//! come last, so that the list is in the order of time until a person moves one. Every change raises a note's revision: who
-//! changes a note says which revision was read, so that nobody's words are lost. A removed note is kept for a while and can
-//! be brought back as it was.
+//! A note is pinned to a step of the drive, and optionally to a run, a stage and a pixel of the left image. New notes are
+//! appended, so that the list is in order of creation until a person moves one. Every change increases a note's revision; a
+//! request to change a note names the revision that it read, so that concurrent edits are not lost. The last removed notes
+//! can be restored.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -15,13 +15,13 @@ use sightline_track::cycle_stage::CycleStage;
 use sightline_track::records::stages_of;
 use sightline_track::settings::TrackerKind;
 
-/// How many notes a session may have.
+/// Maximum number of notes of a session.
 pub(crate) const NOTE_LIMIT: usize = 500;
-/// How many characters a note may have.
+/// Maximum number of characters of a note.
 pub const TEXT_LIMIT: usize = 4000;
-/// How many bytes a time may have.
+/// Maximum length of a time, bytes.
 const TIME_LIMIT: usize = 40;
-/// How many removed notes are kept.
+/// Number of removed notes that can be restored.
 const REMOVED_KEPT: usize = 50;
 
 /// A note.
@@ -29,23 +29,23 @@ const REMOVED_KEPT: usize = 50;
 pub struct Note {
     /// Its number in paths; not used again.
     pub id: u64,
-    /// Raised by every change; what `If-Match` names.
+    /// Increased by every change; the value for `If-Match`.
     pub revision: u64,
     /// Where it is pinned.
     #[serde(flatten)]
     pub pin: Pin,
-    /// What it says, in Markdown.
+    /// Its text, in Markdown.
     pub text: String,
-    /// When it was made: RFC 3339, UTC.
+    /// When it was created: RFC 3339, UTC.
     pub made: String,
-    /// When it was changed last: RFC 3339, UTC.
+    /// When it was last changed: RFC 3339, UTC.
     pub changed: String,
 }
 
 /// Where a note is pinned.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Pin {
-    /// The target's number; null where the note is about the stop alone.
+    /// The target's number; null if the note is about the stop alone.
     #[serde(default)]
     pub target: Option<usize>,
     /// The run's number within the target.
@@ -53,7 +53,7 @@ pub struct Pin {
     pub run: usize,
     /// The stop, from 0.
     pub step: usize,
-    /// The stage or the step of `locate`, by its word.
+    /// The name of the stage or of the step of `locate`.
     #[serde(default)]
     pub stage: Option<String>,
     /// A position in the left image, px.
@@ -65,21 +65,21 @@ pub struct Pin {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewNote {
-    /// Where it is to be pinned.
+    /// Where to pin it.
     #[serde(flatten)]
     pub pin: Pin,
-    /// What it says, in Markdown.
+    /// Its text, in Markdown.
     pub text: String,
 }
 
-/// Changes a note; what is left out stays.
+/// Changes a note; fields that are left out stay unchanged.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EditNote {
-    /// What it says, in Markdown.
+    /// Its text, in Markdown.
     #[serde(default)]
     pub text: Option<String>,
-    /// Its place in the list, from 0; behind the last one counts as last.
+    /// Its index in the list, from 0; a larger index means the end.
     #[serde(default)]
     pub place: Option<usize>,
 }
@@ -87,11 +87,11 @@ pub struct EditNote {
 /// Why a note could not be changed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Refused {
-    /// There is no note of that number.
+    /// There is no note with this number.
     Missing,
-    /// Somebody changed it meanwhile; this is what it is now.
+    /// The note was changed since the revision that was read; contains its current state.
     Changed(Box<Note>),
-    /// The change itself is not possible.
+    /// The change is invalid.
     Bad(String),
 }
 
@@ -99,22 +99,22 @@ pub enum Refused {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Notes {
-    /// The largest number that a note ever had.
+    /// The largest number used so far, also by removed notes.
     pub last_id: u64,
     /// The notes, in their order.
     pub list: Vec<Note>,
-    /// Removed notes with their place, the newest last.
+    /// Removed notes with their indices, in order of removal.
     #[serde(default)]
     pub removed: Vec<(usize, Note)>,
 }
 
 impl Notes {
-    /// The notes of a session that was brought from elsewhere, numbered anew in their order; what they are pinned to may have
-    /// been removed there.
+    /// The notes of an imported session, renumbered in their order; the targets to which they are pinned may have been
+    /// removed.
     ///
     /// # Errors
-    /// [`Error::Request`] when there are too many, or one names a step or stage that does not exist, or says nothing or too
-    /// much.
+    /// [`Error::Request`] if there are too many notes, or a note names a step or stage that does not exist, or its text is
+    /// blank or too long.
     pub fn brought(list: Vec<Note>, session: &Session) -> Result<Self> {
         let mut notes = Self::default();
         for (place, note) in list.into_iter().enumerate() {
@@ -140,7 +140,8 @@ impl Notes {
     /// Adds a note at the end; `now` is RFC 3339, UTC.
     ///
     /// # Errors
-    /// [`Error::Request`] when it is pinned to what does not exist, says nothing or too much, or when there are too many.
+    /// [`Error::Request`] if its pin names something that does not exist, its text is blank or too long, or there are too
+    /// many notes.
     pub fn add(&mut self, new: NewNote, session: &Session, now: &str) -> Result<Note> {
         if self.list.len() >= NOTE_LIMIT {
             return Err(Error::Request(format!("a session may have at most {NOTE_LIMIT} notes")));
@@ -154,15 +155,15 @@ impl Notes {
         Ok(note)
     }
 
-    /// The note of that number.
+    /// The note with this number.
     pub fn get(&self, id: u64) -> Option<&Note> {
         self.list.iter().find(|note| note.id == id)
     }
 
-    /// Changes a note; `revision` is the one that was read, none for whichever it is.
+    /// Changes a note; `revision` is the one that was read, `None` skips the check.
     ///
     /// # Errors
-    /// [`Refused`]; the notes are then as they were.
+    /// [`Refused`]; the notes stay unchanged.
     pub fn edit(
         &mut self,
         id: u64,
@@ -183,10 +184,10 @@ impl Notes {
         Ok(note)
     }
 
-    /// Removes a note, which can be brought back.
+    /// Removes a note; [`Self::restore`] restores it.
     ///
     /// # Errors
-    /// [`Refused`]; the notes are then as they were.
+    /// [`Refused`]; the notes stay unchanged.
     pub fn remove(&mut self, id: u64, revision: Option<u64>) -> Result<(), Refused> {
         let at = self.place_of(id, revision)?;
         let note = self.list.remove(at);
@@ -196,10 +197,10 @@ impl Notes {
         Ok(())
     }
 
-    /// Brings a removed note back to its place.
+    /// Restores a removed note at its previous index.
     ///
     /// # Errors
-    /// [`Refused::Missing`] when it was not removed or not kept.
+    /// [`Refused::Missing`] if it was not removed, or too long ago; [`Refused::Bad`] if there are too many notes.
     pub fn restore(&mut self, id: u64) -> Result<Note, Refused> {
         let at = self.removed.iter().position(|(_, note)| note.id == id).ok_or(Refused::Missing)?;
         if self.list.len() >= NOTE_LIMIT {
@@ -232,7 +233,7 @@ fn checked(text: &str) -> Result<String, String> {
     Ok(text.to_owned())
 }
 
-/// The names of the stages to which a note can be pinned: those of all trackers, then those of a commanded drive.
+/// The names of the stages to which a note can be pinned: the stages of all trackers, then those of a commanded drive.
 fn stages() -> impl Iterator<Item = &'static str> {
     let is_of =
         |name: &&str| TrackerKind::ALL.iter().any(|tracker| stages_of(*tracker).any(|of| of == *name));

@@ -1,10 +1,10 @@
-//! Where a commanded drive waits: before or after any stage of a stop.
+//! Pauses of a commanded drive: before or after any stage of a stop.
 //!
 //! ```text
 //! predict → point_mast → capture → locate → judge → update → set_goal → select_path → drive
 //! ```
-//! Every pause is the first stage that is not computed at a stop ([`Halt`]): after `drive` is before `predict` of the next stop.
-//! The designation is one whole; a pause within it is one before `drive`.
+//! A pause is stored as the first stage that is not computed ([`Halt`]): after `drive` means before `predict` of the next
+//! stop. The designation is not divided; a pause within it becomes a pause before `drive`.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -15,7 +15,7 @@ use crate::step::RunStep;
 use sightline_rover::driving::Cycle;
 use sightline_track::cycle_stage::CycleStage;
 
-/// The side of a stage on which the drive waits.
+/// The side of a stage on which the drive pauses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PauseSide {
@@ -25,7 +25,7 @@ pub enum PauseSide {
     After,
 }
 
-/// A pause before or after a stage, of the stop that `pause_at` names.
+/// A pause before or after a stage of the stop `pause_at`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StagePause {
@@ -35,7 +35,7 @@ pub struct StagePause {
     pub stage: CycleStage,
 }
 
-/// The place in a drive at which it waits.
+/// The stop and stage at which a drive pauses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
 #[schema(as = DriveHalt)]
 pub struct Halt {
@@ -46,7 +46,7 @@ pub struct Halt {
 }
 
 impl StagePause {
-    /// The pause at a stop.
+    /// The halt of this pause at a stop.
     pub fn at(self, stop: usize) -> Halt {
         match self.when {
             PauseSide::Before => Halt { stop, before: self.stage },
@@ -56,7 +56,7 @@ impl StagePause {
 }
 
 impl Halt {
-    /// The next place at which a drive can wait: one stage later.
+    /// The next possible halt: one stage later.
     #[must_use]
     pub fn next(self) -> Self {
         match self.before.next() {
@@ -67,13 +67,13 @@ impl Halt {
 }
 
 impl Steering {
-    /// The place at which the drive waits; `None`: it drives on.
+    /// The halt of the command; `None` without a pause.
     pub fn halt(&self) -> Option<Halt> {
         let whole = StagePause { when: PauseSide::Before, stage: CycleStage::Drive };
         self.pause_at.map(|stop| self.pause.unwrap_or(whole).at(stop))
     }
 
-    /// The same command for a rover that is to stay at its last stop, with the pause that is due there.
+    /// The same command, but staying at the last stop, with a pause that is due there.
     #[must_use]
     pub fn staying(&self, last_stop: usize) -> Self {
         let due = self.halt().filter(|halt| halt.stop <= last_stop);
@@ -81,13 +81,13 @@ impl Steering {
         Self { pause_at: Some(0), pause, ..self.clone() }
     }
 
-    /// The stage before which the drive is to wait at the stop to which it comes next, from `predict` to `update`; `None`: none.
+    /// The stage before which the drive pauses at its next stop, from `predict` to `update`; `None` if it does not.
     pub fn halt_within(&self, stop: usize) -> Option<CycleStage> {
         let halt = self.halt().filter(|halt| stop >= halt.stop)?;
         Some(halt.before).filter(|before| *before <= CycleStage::Update)
     }
 
-    /// Keeps the decisions up to the pause: the last one without what follows from the stages that are not computed.
+    /// Truncates the decisions at the pause: removes the results of stages that are not computed from the last decision.
     pub(crate) fn up_to_halt(&self, cycles: &mut Vec<Cycle>) {
         let Some((halt, last)) = self.halt().zip(cycles.last_mut()) else { return };
         if last.step < halt.stop || last.report.is_some() {
@@ -104,8 +104,8 @@ impl Steering {
 }
 
 impl Session {
-    /// The stage before which a step at the last stop of a commanded drive is to be paused: by its command, or because the world
-    /// is not ready for it. `None`: the whole step.
+    /// The stage before which a step at the last stop of a commanded drive pauses: by its command, or because the world is
+    /// not ready for it. `None`: the whole step is computed.
     pub(crate) fn halt_within(&self, stop: usize) -> Option<CycleStage> {
         if stop + 1 != self.stop_count {
             return None;
@@ -115,7 +115,7 @@ impl Session {
     }
 }
 
-/// The place at which the run that drives waits, from its steps and the number of stops.
+/// The halt of the driving run, from its steps and the number of stops.
 pub(crate) fn halted(
     steering: &Steering,
     steps: &[std::sync::Arc<RunStep>],

@@ -1,14 +1,15 @@
-//! How bright the target was at each stop, and under which angles it was lit and seen (K§7.1, R136; the export is ours).
+//! Photometry of the target at each stop: its brightness, and the angles of illumination and view ([Kim09 §7.1], R136; the
+//! export is ours).
 //!
 //! ```text
-//! n = ± (∂p/∂x × ∂p/∂y) / │…│      towards the camera: the surface that stereo measured around the target
+//! n = ± (∂p/∂x × ∂p/∂y) / │…│      towards the camera: normal of the surface around the target, by stereo
 //! i = ∠(n, s),   e = ∠(n, v),   g = ∠(s, v)
-//! rate = mean level of the window / time of exposure
+//! rate = mean level of the window / exposure time
 //! ```
-//! Levels are what the camera recorded, as fractions of full scale; without a calibration of the camera the rate is
-//! radiance up to one factor, the same for all stops of a camera whose offset was taken out. The surface is stereo's
-//! plane over the window: its relief is averaged, and its normal is known to some degrees. Angles to the sun are null
-//! where the recording does not say where it stood; angles to the surface where stereo found no slope.
+//! Levels are recorded grey values as fractions of full scale. Without a radiometric calibration the rate is the radiance up
+//! to a factor, which is the same for all stops of a camera if its offset was subtracted. The surface is the plane fitted by
+//! stereo over the window: relief is averaged, and the normal is accurate to some degrees. Angles to the sun are null if the
+//! recording lacks the sun's direction; angles to the surface are null if stereo found no slope.
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
@@ -26,30 +27,30 @@ use sightline_track::trace::StepTrace;
 use sightline_vision::image::patch::{self, Patch};
 use sightline_world::traverse::StopLight;
 
-/// The target's light at one stop.
+/// The photometry of the target at one stop.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Photometry {
     /// The stop, from 0.
     pub step: usize,
     /// Mean level of the window at the target, fraction of full scale.
     pub mean_level: f64,
-    /// Its standard deviation over the window.
+    /// Standard deviation of the level over the window, fraction of full scale.
     pub std_level: f64,
-    /// Time of exposure, s.
+    /// Exposure time, s; null if unknown.
     pub exposure_s: Option<f64>,
-    /// Mean level over time of exposure, fraction of full scale per s.
+    /// Mean level over exposure time, fraction of full scale per s; null without an exposure time.
     pub rate_per_s: Option<f64>,
-    /// Angle between the surface's normal and the sun, deg.
+    /// Angle between the surface normal and the direction to the sun, deg.
     pub incidence_deg: Option<f64>,
-    /// Angle between the surface's normal and the camera, deg.
+    /// Angle between the surface normal and the direction to the camera, deg.
     pub emission_deg: Option<f64>,
-    /// Angle between sun and camera at the target, deg.
+    /// Angle between the directions to the sun and the camera, deg.
     pub phase_deg: Option<f64>,
-    /// Distance from the left camera, m.
+    /// Distance of the target from the left camera, m.
     pub range_m: f64,
 }
 
-/// The light at the target of an accepted update or of a designation; nothing for any other step.
+/// The photometry of an accepted update or a designation; `None` for any other step.
 pub fn photometry(
     trace: &StepTrace,
     site_from_rover: &Pose,
@@ -84,7 +85,7 @@ pub fn photometry(
     })
 }
 
-/// The image at the target, as large as the template.
+/// The image window at the target, with the size of the template.
 fn window(trace: &StepTrace, settings: &TemplateSettings) -> Option<Patch> {
     if let Some(matched) = trace.template().and_then(|evidence| evidence.match_template.as_ref()) {
         return matched.matched.get().cloned();

@@ -1,5 +1,5 @@
-//! How a run comes forward: what it needs next, how it is cancelled and resumed, and how all of it begins
-//! again from a saved session. Steps are never saved: the same input gives the same bits.
+//! Progress of runs: their next computation, cancelling and resuming them, and restoring a saved session. Steps are never
+//! saved: the same input gives the same bits.
 
 use std::sync::Arc;
 
@@ -15,10 +15,10 @@ use sightline_track::cycle_stage::CycleStage;
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
 
-/// What a cancelled run says.
+/// The reason of a cancelled run.
 const CANCELLED: &str = "cancelled";
 
-/// What a run needs next.
+/// The next computation of a run.
 #[derive(Clone, Debug)]
 pub enum Next {
     /// Its first step: the designation under the run's own settings.
@@ -30,29 +30,29 @@ pub enum Next {
     },
     /// The step after its last one.
     Advance(Pending),
-    /// The world's part of the stages before a pause at the last stop: pointing the mast, taking the images.
+    /// The stages of the world after a pause at the last stop: pointing the mast, taking the images.
     Prepare {
-        /// The run's last whole step, whose target the mast is pointed at.
+        /// The run's last whole step; the mast is pointed at its target.
         last: Arc<RunStep>,
-        /// The stage before which the drive is paused again; `None`: it is not.
+        /// The stage before which the drive pauses next; `None` without a pause.
         before: Option<CycleStage>,
     },
-    /// A drive to another stop, on the estimates of these steps.
+    /// A drive to the next stop, on the estimates of these steps.
     Drive {
-        /// Who drives, and how.
+        /// The driving run and its command.
         steering: Box<Steering>,
-        /// The run's steps so far; the last is that of the last stop.
+        /// The run's steps so far; the last one is at the last stop.
         steps: Vec<Arc<RunStep>>,
     },
-    /// Nothing: it is complete, was stopped, or its target was removed.
+    /// Nothing: the run is complete or stopped, or is not needed.
     Nothing,
 }
 
 impl Session {
-    /// The session of a saved form; its runs have no steps yet, and [`Session::next`] says how to get them.
+    /// Restores a saved session. Its runs have no steps yet; [`Session::next`] returns the computations that create them.
     ///
     /// # Errors
-    /// [`Error::Request`] for another version of the form, or when a target or run names what cannot exist.
+    /// [`Error::Request`] for another version of the format, or if a target or run is inconsistent.
     pub fn restored(saved: &SavedSession, stop_count: usize) -> Result<Self> {
         if saved.format != SAVED_FORMAT {
             let format = saved.format;
@@ -66,21 +66,21 @@ impl Session {
         let new = Self::new(&saved.id, &saved.traverse, stop_count);
         let (steering, visits) = (saved.steering.clone(), saved.visits.clone());
         let mut session = Self { targets, breakpoints, steering, visits, ..new };
-        // Those removed before an earlier end of the program count as removed in the order of their numbers.
+        // The order of removal is not saved; the order of the numbers replaces it.
         for (number, record) in saved.targets.iter().enumerate() {
             if record.removed && !record.runs.is_empty() {
                 session.note_removal(number);
             }
         }
-        // A cursor that points nowhere is no reason to lose the targets.
+        // An invalid cursor is ignored, so that the targets are not lost.
         let _ = session.move_cursor(saved.cursor);
         Ok(session)
     }
 
-    /// What a run needs next. A run that shares steps with the one it left takes them over here.
+    /// The next computation of a run. Copies the steps that a fork shares with its parent first.
     ///
     /// # Errors
-    /// [`Error::Request`] when there is no such target or run.
+    /// [`Error::Request`] if there is no such target or run.
     pub fn next(&mut self, target: usize, run: usize) -> Result<Next> {
         let designation = self.target(target)?.designation;
         let current = self.any_run(target, run)?;
@@ -114,7 +114,7 @@ impl Session {
         Ok(self.drive_of(target, run).unwrap_or(Next::Nothing))
     }
 
-    /// What the world still has to do for the next stage at the last stop, where this run drives and is not to wait for it.
+    /// The pending stages of the world at the last stop, if this run drives and is not paused before them.
     fn preparation(&self, target: usize, number: usize) -> Result<Option<Next>> {
         let run = self.any_run(target, number)?;
         let steering = self.steering.as_ref().filter(|s| (s.target, s.run) == (target, number));
@@ -128,7 +128,7 @@ impl Session {
         Ok(goes_on.then(|| Next::Prepare { last: Arc::clone(last), before }))
     }
 
-    /// The drive to another stop, where this run has located the target at the last stop, drives, and is not to wait.
+    /// The drive to the next stop, if this run drives, has completed its step at the last stop, and is not paused.
     fn drive_of(&self, target: usize, number: usize) -> Option<Next> {
         let steering =
             self.steering.as_ref().filter(|steering| (steering.target, steering.run) == (target, number))?;
@@ -139,18 +139,18 @@ impl Session {
             .then(|| Next::Drive { steering: Box::new(steering.clone()), steps: run.steps.clone() })
     }
 
-    /// Lets a run drive under a command.
+    /// Sets the driving run and its command.
     ///
     /// # Errors
-    /// [`Error::Request`] when there is no such target or run, or its target is not located yet; [`Error::Setting`] for a command
-    /// that makes no sense for the target.
+    /// [`Error::Request`] if there is no such target or run, or its target is not located yet; [`Error::Setting`] for a
+    /// command that is invalid for the target.
     pub fn steer(&mut self, traverse: &Traverse, mut steering: Steering) -> Result<()> {
         self.check_then(steering.target, &steering.then)?;
         let run = self.run(steering.target, steering.run)?;
         let first = run.steps.first().ok_or_else(|| {
             Error::Request("the target is not located yet; wait for the run's first step".to_owned())
         })?;
-        // A changed command for the present target approaches it from the same place.
+        // A changed command for the current target keeps the stop at which the drive to it began.
         if let Some(present) = self.steering.as_ref().filter(|present| present.target == steering.target) {
             steering.command.since = steering.command.since.or(present.command.since);
         }
@@ -164,10 +164,10 @@ impl Session {
         Ok(())
     }
 
-    /// Stops a run after its last step so far; that survives a restart.
+    /// Stops a run after its last step so far; this survives a restart.
     ///
     /// # Errors
-    /// [`Error::Request`] when there is no such target or run.
+    /// [`Error::Request`] if there is no such target or run.
     pub fn cancel(&mut self, target: usize, run: usize) -> Result<()> {
         let run = self.run_mut(target, run)?;
         run.stop_after = run.steps.last().map(|last| last.step).or(run.stop_after);
@@ -175,29 +175,29 @@ impl Session {
         Ok(())
     }
 
-    /// Lets a stopped run go on.
+    /// Resumes a stopped run.
     ///
     /// # Errors
-    /// [`Error::Request`] when there is no such target or run.
+    /// [`Error::Request`] if there is no such target or run.
     pub fn resume(&mut self, target: usize, run: usize) -> Result<()> {
         let run = self.run_mut(target, run)?;
         (run.stop_after, run.stopped) = (None, None);
         Ok(())
     }
 
-    /// Stops a run because something went wrong; after a restart it is tried again.
+    /// Stops a run because of an error; after a restart it is tried again.
     ///
     /// # Errors
-    /// [`Error::Request`] when there is no such target or run.
+    /// [`Error::Request`] if there is no such target or run.
     pub fn fail(&mut self, target: usize, run: usize, why: impl Into<String>) -> Result<()> {
         self.run_mut(target, run)?.stopped = Some(why.into());
         Ok(())
     }
 
-    /// A run of a target, to change it.
+    /// Mutable access to a run of a target.
     ///
     /// # Errors
-    /// [`Error::Request`] when there is none of that number.
+    /// [`Error::Request`] if there is none with this number.
     pub fn run_mut(&mut self, target: usize, run: usize) -> Result<&mut Run> {
         let found = self.target_mut(target)?.runs.get_mut(run);
         found.ok_or_else(|| Error::Request(format!("target {target} has no run {run}")))
@@ -205,14 +205,14 @@ impl Session {
 }
 
 impl Run {
-    /// The steps before `from_step`; none when the run has not come so far.
+    /// The steps before `from_step`; `None` if the run has not reached it.
     pub(crate) fn steps_before(&self, from_step: usize) -> Option<Vec<Arc<RunStep>>> {
         let kept: Vec<_> =
             self.whole_steps().iter().filter(|trace| trace.step < from_step).cloned().collect();
         kept.last().is_some_and(|last| last.step + 1 == from_step).then_some(kept)
     }
 
-    /// Why the run is not going on before the last stop.
+    /// Why the run stopped before the last stop; `None` if it did not.
     pub fn why_stopped(&self) -> Option<String> {
         let reached = self.stop_after.is_some() && self.steps.last().map(|last| last.step) == self.stop_after;
         self.stopped.clone().or_else(|| reached.then(|| CANCELLED.to_owned()))
@@ -225,7 +225,7 @@ fn restored_target(number: usize, saved: &SavedTarget, stop_count: usize) -> Res
         let step = saved.designation.step;
         return Err(wrong(format!("step {step} does not exist: the traverse has {stop_count} stops")));
     }
-    // A target that was removed long ago has none.
+    // A target that can no longer be restored has no runs.
     if saved.runs.is_empty() && !saved.removed {
         return Err(wrong("it has no run".to_owned()));
     }

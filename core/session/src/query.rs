@@ -1,4 +1,4 @@
-//! An expression over all steps of all runs of a session: where it is true, and what its values are.
+//! Evaluation of an expression at all steps of all runs of a session: its hits and its values.
 
 use std::sync::Arc;
 
@@ -10,36 +10,36 @@ use super::expression::catalogue::Name;
 use super::expression::{Answers, Expression, Value};
 use crate::step::RunStep;
 
-/// Asks an expression at every step.
+/// Requests the evaluation of an expression at every step.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Query {
     /// The expression.
     pub expression: String,
-    /// Only this target; left out: all of them.
+    /// Only this target; default: all targets.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub target: Option<usize>,
-    /// Whether the values are wanted, and not only the steps at which it is true.
+    /// Whether to return the values in addition to the steps at which it is true.
     #[serde(default)]
     pub values: bool,
 }
 
-/// What an expression is at every step.
+/// The result of an expression at every step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct QueryAnswer {
-    /// The expression, as it was understood.
+    /// The expression in canonical form.
     pub expression: String,
-    /// What its values are.
+    /// The type of its values.
     pub answers: Answers,
     /// Their unit; empty without one.
     pub unit: String,
-    /// Steps at which it is true, in all runs.
+    /// Number of steps of all runs at which it is true.
     pub count: usize,
-    /// Run by run.
+    /// The results by run.
     pub runs: Vec<RunAnswer>,
 }
 
-/// What an expression is at every step of one run.
+/// The result of an expression at every step of one run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct RunAnswer {
     /// The target's number.
@@ -48,28 +48,28 @@ pub struct RunAnswer {
     pub run: usize,
     /// The stop of the run's first step.
     pub first_step: usize,
-    /// How many steps were asked.
+    /// Number of evaluated steps.
     pub steps: usize,
     /// The stops at which it is true.
     pub hits: Vec<usize>,
-    /// Its values step by step: numbers, 1 and 0 for yes and no, null where missing; empty where they were not wanted.
+    /// Its values by step: numbers, 1 and 0 for yes and no, null if missing; empty if they were not requested.
     pub values: Vec<Option<f64>>,
 }
 
-/// The language, for whoever writes expressions in a program.
+/// A description of the expression language for programs.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct Language {
     /// Every name.
     pub names: Vec<Name>,
     /// Every function.
     pub functions: Vec<FunctionView>,
-    /// Every unit that a number may bear.
+    /// Every unit that may follow a number.
     pub units: Vec<String>,
-    /// How many characters an expression may have.
+    /// Maximum number of characters of an expression.
     pub length_limit: usize,
-    /// How many things may stand inside each other.
+    /// Maximum depth of nesting.
     pub depth_limit: usize,
-    /// How many parts an expression may have.
+    /// Maximum number of nodes of an expression.
     pub node_limit: usize,
 }
 
@@ -78,13 +78,13 @@ pub struct Language {
 pub struct FunctionView {
     /// Its name.
     pub name: String,
-    /// How it is written.
+    /// Its notation.
     pub form: String,
-    /// What it means.
+    /// Its meaning, as one sentence.
     pub meaning: String,
 }
 
-/// Asks what could be written at a place.
+/// Requests the completions at a position.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CompletionQuery {
@@ -94,7 +94,7 @@ pub struct CompletionQuery {
     pub cursor: usize,
 }
 
-/// The steps of a target's runs as they are now; further steps do not change it.
+/// A snapshot of the steps of a target's runs.
 #[derive(Clone, Debug)]
 pub struct TargetSteps {
     /// The target's number.
@@ -104,7 +104,7 @@ pub struct TargetSteps {
 }
 
 impl Session {
-    /// The steps of one target, or of all that were not removed.
+    /// The steps of one target, or of all targets that were not removed.
     pub fn steps_of(&self, only: Option<usize>) -> Vec<TargetSteps> {
         let there = self
             .targets
@@ -119,7 +119,7 @@ impl Session {
     }
 }
 
-/// What `expression` is at every step of `targets`.
+/// Evaluates `expression` at every step of `targets`.
 pub fn ask(expression: &Expression, targets: &[TargetSteps], with_values: bool) -> QueryAnswer {
     let mut answer = QueryAnswer {
         expression: expression.to_string(),
@@ -159,7 +159,7 @@ pub fn ask(expression: &Expression, targets: &[TargetSteps], with_values: bool) 
     answer
 }
 
-/// A value as a number.
+/// The value as a number for plots; `None` for missing values and other types.
 fn plotted(value: &Value) -> Option<f64> {
     match value {
         Value::Number(value) => Some(*value),
@@ -168,7 +168,7 @@ fn plotted(value: &Value) -> Option<f64> {
     }
 }
 
-/// The whole language of this build.
+/// The expression language of this build.
 pub fn language() -> Language {
     use super::expression::{DEPTH_LIMIT, LENGTH_LIMIT, NODE_LIMIT, catalogue, functions, unit};
     let function = |info: &functions::FunctionInfo| FunctionView {

@@ -59,7 +59,7 @@ pub fn stages() -> &'static [Stage<RunStep>] {
     &STAGES
 }
 
-/// The stage of a name.
+/// The stage with this name.
 pub fn stage(name: &str) -> Option<&'static Stage<RunStep>> {
     STAGES.iter().find(|stage| stage.schema().stage == name)
 }
@@ -74,12 +74,12 @@ pub fn records(step: &RunStep) -> Vec<StageRecord> {
     STAGES.iter().map(|stage| stage.record(step)).collect()
 }
 
-/// The quantity at a path of the serialised step, whichever tracker made it.
+/// The quantity at a path of the serialised step, for any tracker.
 pub(crate) fn quantity_at(path: &str) -> Option<&'static Quantity> {
     within(path).find_map(|(schema, name)| schema.quantity(name))
 }
 
-/// The unit of the field at a path of the serialised step: as its stage declares it, else as its name tells.
+/// The unit of the field at a path of the serialised step: the declared one, else the one that follows from its name.
 pub fn unit_at(path: &str) -> Option<Unit> {
     let field = |(schema, name): (&'static StageSchema, &str)| {
         schema.fields.iter().find(|(field, _)| field == name).map(|(_, unit)| *unit)
@@ -88,7 +88,7 @@ pub fn unit_at(path: &str) -> Option<Unit> {
     declared.or_else(|| Unit::of_name(path.rsplit('.').next()?))
 }
 
-/// The stages whose evidence contains a path, with the rest of it.
+/// The stages whose evidence contains a path, each with the rest of the path.
 fn within(path: &str) -> impl Iterator<Item = (&'static StageSchema, &str)> {
     STAGES.iter().map(Stage::schema).flat_map(move |schema| {
         let rest = move |place: &str| path.strip_prefix(place)?.strip_prefix('.');
@@ -106,13 +106,13 @@ pub fn row_value(row: &StepRow, column: &str) -> Option<f64> {
     ROW.value_of(row, column)?.number()
 }
 
-/// The same in another unit of its dimension.
+/// The number in a column of [`StepRow`], converted to another unit of its dimension.
 pub fn row_value_in(row: &StepRow, column: &str, unit: Unit) -> Option<f64> {
     let declared = row_quantity(column)?.unit;
     Some(row_value(row, column)? * (unit.per_base() / declared.per_base()))
 }
 
-/// A quantity of a stage: how views that show any number of a step name and read it.
+/// A quantity of a stage, for views that show any number of a step.
 #[derive(Clone, Copy)]
 pub struct StageQuantity {
     stage: &'static Stage<RunStep>,
@@ -120,13 +120,13 @@ pub struct StageQuantity {
 }
 
 impl StageQuantity {
-    /// Every quantity of the stages that have evidence of their own, in running order.
+    /// Every quantity of the stages that have their own evidence, in running order.
     pub fn all() -> impl Iterator<Item = Self> {
         let stages = STAGES.iter().filter(|stage| !stage.schema().path.is_empty());
         stages.flat_map(|stage| (0..stage.schema().quantities.len()).map(move |index| Self { stage, index }))
     }
 
-    /// The quantity called `stage.quantity`; those of a row are called `step.column`.
+    /// The quantity with the name `stage.quantity`, or `step.column` for columns of the row.
     pub fn named(name: &str) -> Option<Self> {
         let (word, name) = name.split_once('.')?;
         let stage = stage(word)?;
@@ -144,17 +144,17 @@ impl StageQuantity {
         &self.stage.schema().quantities[self.index]
     }
 
-    /// The name by which expressions, explanations and tables know it: `stage.quantity`.
+    /// Its name in expressions, explanations and tables: `stage.quantity`.
     pub fn name(self) -> String {
         format!("{}.{}", self.stage.schema().stage, self.declared().name)
     }
 
-    /// The value at a step; missing where the stage was not reached.
+    /// The value at a step; missing if the stage was not reached.
     pub fn value(self, step: &RunStep) -> Value {
         self.stage.value(step, self.index)
     }
 
-    /// The number at a step, where it is one and finite.
+    /// The number at a step; `None` if it is missing, not a number, or not finite.
     pub fn number(self, step: &RunStep) -> Option<f64> {
         self.value(step).number().filter(|value| value.is_finite())
     }

@@ -1,16 +1,16 @@
-//! Removing targets and runs, and taking that back: nothing that was recorded is overwritten or lost.
+//! Removing and restoring targets and runs; recorded data are not overwritten.
 //!
-//! Runs are a tree: a run shares the steps before its fork with the one it left. A removed run is hidden, its number is
-//! not used again, and it is still computed after a restart where a run that left it needs its steps.
+//! Runs are a tree: a fork shares the steps before the fork with its parent. A removed run is hidden and its number is not
+//! used again; it is still computed after a restart if a fork needs its steps.
 //!
-//! The last [`RESTORABLE_TARGETS`] removed targets can be restored. Older ones keep their number and label only, so that
-//! picking and removing for hours takes no more memory than a short session.
+//! The last [`RESTORABLE_TARGETS`] removed targets can be restored. Older ones keep only their number and label, so that
+//! the memory of a long session is bounded.
 
 use crate::{Cursor, Run, Session};
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::Pixel;
 
-/// How many removed targets of a session can be restored.
+/// Number of removed targets of a session that can be restored.
 pub const RESTORABLE_TARGETS: usize = 16;
 
 impl Session {
@@ -19,11 +19,11 @@ impl Session {
         self.targets.iter().filter(|record| !record.removed).count()
     }
 
-    /// Removes a target; its number is not used again. The target that was removed longest ago gives its runs up once more
-    /// than [`RESTORABLE_TARGETS`] are removed.
+    /// Removes a target; its number is not used again. Once more than [`RESTORABLE_TARGETS`] are removed, the one removed
+    /// first loses its runs.
     ///
     /// # Errors
-    /// [`Error::Request`] when there is no such target.
+    /// [`Error::Request`] if there is no such target.
     pub fn remove_target(&mut self, target: usize) -> Result<()> {
         let record = self.target_mut(target)?;
         record.removed = true;
@@ -39,7 +39,7 @@ impl Session {
         Ok(())
     }
 
-    /// Remembers that a target was removed last.
+    /// Records a target as the last one removed.
     pub(super) fn note_removal(&mut self, target: usize) {
         self.removals.push_back(target);
         while self.removals.len() > RESTORABLE_TARGETS {
@@ -50,10 +50,10 @@ impl Session {
         }
     }
 
-    /// Takes the removal of a target back, and looks at it.
+    /// Restores a removed target, and selects it.
     ///
     /// # Errors
-    /// [`Error::Request`] when there is no such target, it was not removed, or too long ago.
+    /// [`Error::Request`] if there is no such target, or it was not removed, or too long ago.
     pub fn restore_target(&mut self, target: usize) -> Result<()> {
         let id = self.id.clone();
         let found = self.targets.get_mut(target).filter(|record| record.removed);
@@ -71,10 +71,10 @@ impl Session {
         Ok(())
     }
 
-    /// Removes a run; what left it keeps the steps that both share. The cursor goes to the run that it left.
+    /// Removes a run; its forks keep the shared steps. If it is selected, the cursor moves to its parent or another run.
     ///
     /// # Errors
-    /// [`Error::Request`] when there is no such run, or no other one.
+    /// [`Error::Request`] if there is no such run, or it is the only one.
     pub fn remove_run(&mut self, target: usize, run: usize) -> Result<()> {
         let parent = self.run(target, run)?.fork.map(|fork| fork.run);
         let record = self.target(target)?;
@@ -91,10 +91,10 @@ impl Session {
         Ok(())
     }
 
-    /// Takes the removal of a run back.
+    /// Restores a removed run.
     ///
     /// # Errors
-    /// [`Error::Request`] when there is no such run, or it was not removed.
+    /// [`Error::Request`] if there is no such run, or it was not removed.
     pub fn restore_run(&mut self, target: usize, run: usize) -> Result<()> {
         if !self.any_run(target, run)?.removed {
             return Err(Error::Request(format!("run {run} of target {target} was not removed")));
@@ -103,7 +103,7 @@ impl Session {
         Ok(())
     }
 
-    /// Whether somebody looks at a run, or at one that left it, so that its steps must be computed.
+    /// Whether a run, or a fork of it, was not removed, so that its steps must be computed.
     pub fn is_needed(&self, target: usize, run: usize) -> bool {
         let Ok(record) = self.target(target) else { return false };
         let leaves = |child: &Run| child.fork.is_some_and(|fork| fork.run == run);
@@ -112,10 +112,11 @@ impl Session {
                 .any(|child| leaves(&record.runs[child]) && self.is_needed(target, child))
     }
 
-    /// Puts the prediction of a run's first own step at a pixel of the left image; before that step was computed.
+    /// Displaces the prediction of a run's first own step to a pixel of the left image; to be called before that step is
+    /// computed.
     ///
     /// # Errors
-    /// [`Error::Request`] when there is no such run, or it begins with a designation, which has no prediction.
+    /// [`Error::Request`] if there is no such run, or it begins with a designation, which has no prediction.
     pub fn displace(&mut self, target: usize, run: usize, prediction_px: Pixel) -> Result<()> {
         let designated = self.target(target)?.designation.step;
         let fork = self.run_mut(target, run)?.fork.as_mut().filter(|fork| fork.from_step > designated);
@@ -127,7 +128,7 @@ impl Session {
     /// A run of a target, removed or not.
     ///
     /// # Errors
-    /// [`Error::Request`] when there is none of that number.
+    /// [`Error::Request`] if there is none with this number.
     pub(crate) fn any_run(&self, target: usize, run: usize) -> Result<&Run> {
         let found = self.target(target)?.runs.get(run);
         found.ok_or_else(|| self.no_run(target, run))
@@ -146,7 +147,7 @@ pub(super) const NO_PREDICTION: &str =
     "prediction_px: the target is designated at this step, so that nothing is predicted: leave it out";
 
 impl Run {
-    /// Where a person put the prediction of a step in the left image, px.
+    /// The displaced prediction of a step in the left image, px; `None` if it is by dead reckoning.
     pub fn displaced_at(&self, step: usize) -> Option<Pixel> {
         self.fork.filter(|fork| fork.from_step == step).and_then(|fork| fork.prediction_px)
     }
@@ -161,7 +162,7 @@ mod tests {
     use sightline_track::settings::Settings;
     use sightline_track::target::Designation;
 
-    /// A session of so many targets without steps.
+    /// A session with this number of targets, without steps.
     fn session(targets: usize) -> Session {
         let designation = Designation::new(0, Pixel::new(1.0, 2.0));
         let target = |number| TargetRecord {

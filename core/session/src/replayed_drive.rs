@@ -1,4 +1,4 @@
-//! A drive command evaluated along a recording: the decision at every stop beside the recorded motion.
+//! A drive command evaluated along a recording: the decision at every stop, compared with the recorded motion.
 
 use std::sync::Arc;
 
@@ -30,18 +30,18 @@ pub struct ReplayedDrive<'a> {
     maps: HazardMaps,
 }
 
-/// How a recording compares with the commands of the loop.
+/// Comparison of a recording with the commands of the drive loop.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ReplaySummary {
-    /// Stops, the first included.
+    /// Number of stops, the first included.
     pub stops: usize,
-    /// Why the commanded drive would have stopped; null where the recording ends first.
+    /// Why the commanded drive would have stopped; null if the recording ends first.
     pub reason: Option<StopReason>,
     /// Median and largest distance between the commanded and the recorded end of a step, m; null without a step.
     pub apart_m: Option<[f64; 2]>,
     /// Largest angle between the commanded and the recorded direction of the mast, deg; null without a mast.
     pub mast_apart_deg: Option<f64>,
-    /// Whether the tracker still holds the target at the last stop.
+    /// Whether the state at the last stop is `tracking`.
     pub holds_target: bool,
 }
 
@@ -49,7 +49,7 @@ impl<'a> ReplayedDrive<'a> {
     /// Designates the target and takes the command.
     ///
     /// # Errors
-    /// A pixel without a 3-D position, a command that makes no sense for the target, or
+    /// Fails for a pixel without a 3-D position, or a command that is invalid for the target, and with
     /// [`sightline_geometry::error::Error::Cancelled`].
     pub fn begin(
         traverse: &'a Traverse,
@@ -59,7 +59,7 @@ impl<'a> ReplayedDrive<'a> {
         cancel: Cancel<'_>,
     ) -> Result<Self> {
         command.validate()?;
-        // A recording keeps its poses.
+        // The recorded poses are used.
         let command = DriveCommand { odometry: OdometryMode::Off, ..command };
         let first = track::designate_until(traverse, designation, settings, cancel)?;
         check_command(traverse, &command, &first.trace)?;
@@ -68,7 +68,7 @@ impl<'a> ReplayedDrive<'a> {
         Ok(Self { traverse, world, command, steps, cycles: Vec::new(), maps: HazardMaps::default() })
     }
 
-    /// Decides at the last stop and tracks at the next; false once the drive has ended or the recording ends.
+    /// Decides at the last stop and tracks at the next one. Returns false once the drive or the recording has ended.
     ///
     /// # Errors
     /// [`sightline_geometry::error::Error::Cancelled`].
@@ -99,7 +99,7 @@ impl<'a> ReplayedDrive<'a> {
         Ok(true)
     }
 
-    /// How the stop after this one differs from the command that led there.
+    /// The difference between the command of this cycle and the recorded next stop.
     pub fn answer_to(&self, cycle: &Cycle) -> Option<&Answer> {
         self.world.answers().iter().find(|answer| answer.step == cycle.step + 1)
     }

@@ -1,8 +1,8 @@
-//! A session brought from elsewhere: the file `reproduce.json` of an export, opened again.
+//! Import of a session from the file `reproduce.json` of an export.
 //!
-//! The file holds more than is needed to begin again (hashes, commands, versions); [`Opened::read`] takes out of it the drive, what
-//! the person did and the notes, which is what travels to the server. Steps are not in it: the same input gives the same
-//! bits, so that they are computed again.
+//! [`Opened::read`] extracts the drive, the saved session and the notes, which are sent to the server; other contents of the
+//! file (hashes, commands, versions) are not needed. The file contains no steps: they are recomputed, since the same input
+//! gives the same bits.
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -14,52 +14,52 @@ use super::view::SavedSession;
 use sightline_rover::version::tracker_version;
 use sightline_world::rover::driven::DrivenStop;
 
-/// What the file says that it is.
+/// The value of the file's field `format`.
 pub const FORMAT: &str = "sightline-reproduce";
 /// The version of the file that this code reads and writes.
 pub const FORMAT_VERSION: u32 = 1;
 
-/// Begins a session as it was elsewhere. What else the exported file has (hashes, commands, versions) is ignored, so that it
-/// can be sent as it is.
+/// Begins a session from an export. Other fields of the exported file (hashes, commands, versions) are ignored, so that it
+/// can be sent unchanged.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Reproduction {
     /// The drive.
     pub traverse: ReproducedTraverse,
-    /// What the person did: targets, runs with their whole configurations, breakpoints and cursor.
+    /// The saved session: targets, runs with their complete configurations, breakpoints and cursor.
     #[schema(value_type = Object)]
     pub session: SavedSession,
-    /// What the person wrote.
+    /// The notes.
     #[serde(default)]
     pub notes: Vec<Note>,
 }
 
-/// The drive of a session from elsewhere; what else the file says of it is ignored.
+/// The drive of an imported session; other fields of the file are ignored.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ReproducedTraverse {
-    /// Its name in paths, which another index would not have.
+    /// Its name in paths; it differs if the index of the drive differs.
     pub id: String,
-    /// Its short name.
+    /// Its display name.
     pub name: String,
     /// The scenario of a simulated drive, as TOML; a recorded one must be open already.
     #[serde(default)]
     pub scenario_toml: Option<String>,
-    /// The state of the world of a drive on commands, one stop after the other.
+    /// The state of the world at each stop of a drive on commands; null for other drives.
     #[serde(default)]
     #[schema(value_type = Option<Vec<Object>>)]
     pub driven: Option<Vec<DrivenStop>>,
 }
 
-/// A file that was read.
+/// A parsed file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Opened {
-    /// What to begin.
+    /// The session to begin.
     pub reproduction: Reproduction,
-    /// The tracker that made the file, where it is another one than this: its numbers may differ.
+    /// The version of the tracker that wrote the file, if it is not this one: its numbers may differ.
     pub other_tracker: Option<String>,
 }
 
 impl Opened {
-    /// Whether a JSON value says that it is such a file.
+    /// Whether a JSON value is such a file, by its field `format`.
     pub fn is_one(value: &Value) -> bool {
         value["format"] == FORMAT
     }
@@ -67,7 +67,7 @@ impl Opened {
     /// Reads the file's JSON value.
     ///
     /// # Errors
-    /// What is wrong with it, by the name of the field, as the end of a sentence.
+    /// The error with the name of the field, as the end of a sentence.
     pub fn read(value: &Value) -> Result<Self, String> {
         let version = &value["format_version"];
         if *version != FORMAT_VERSION {

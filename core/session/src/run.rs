@@ -9,40 +9,40 @@ use crate::step::RunStep;
 use sightline_geometry::frames::Pixel;
 use sightline_track::settings::Settings;
 
-/// Where a run left another.
+/// The fork of a run from its parent.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Fork {
-    /// The run it left.
+    /// The number of the parent run.
     pub run: usize,
-    /// The first step that was computed with the new settings.
+    /// The first step that is computed with the new settings.
     pub from_step: usize,
-    /// Where the prediction of that step was put in the left image, px; null: where dead reckoning has it.
+    /// The displaced prediction of that step in the left image, px; null: by dead reckoning.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prediction_px: Option<Pixel>,
 }
 
 impl Fork {
-    /// Leaves `run` at `from_step`.
+    /// A fork from `run` at `from_step`.
     pub const fn new(run: usize, from_step: usize) -> Self {
         Self { run, from_step, prediction_px: None }
     }
 }
 
-/// One configuration over one target. Steps shared with the run it forked from are the same values.
+/// One configuration over one target. Steps shared with the parent run are shared by pointer.
 #[derive(Clone, Debug)]
 pub struct Run {
     /// The configuration.
     pub settings: Arc<Settings>,
-    /// Where it left another run.
+    /// Its fork from a parent run; `None` for the first run.
     pub fork: Option<Fork>,
     /// The steps so far; the first is the designation.
     pub steps: Vec<Arc<RunStep>>,
-    /// The step after which a person stopped it.
+    /// The step after which a person stopped it; `None` if it was not stopped.
     pub stop_after: Option<usize>,
-    /// Why it stopped before the last stop: `cancelled`, or what went wrong.
+    /// Why it stopped before the last stop: `cancelled`, or an error; `None` if it did not.
     pub stopped: Option<String>,
-    /// Whether the person removed it; numbers of the others stay as they are.
+    /// Whether it was removed; the other runs keep their numbers.
     pub removed: bool,
 }
 
@@ -52,17 +52,17 @@ impl Run {
         Self { settings, fork, steps, stop_after: None, stopped: None, removed: false }
     }
 
-    /// The steps without the one at which a drive is paused between two stages.
+    /// The steps without a last step that is paused between two stages.
     pub fn whole_steps(&self) -> &[Arc<RunStep>] {
         &self.steps[..self.steps.len() - usize::from(self.begun().is_some())]
     }
 
-    /// The last step where a drive is paused between two of its stages.
+    /// The last step, if it is paused between two stages.
     pub fn begun(&self) -> Option<&Arc<RunStep>> {
         self.steps.last().filter(|last| last.is_begun())
     }
 
-    /// The record of a stop, where it was computed.
+    /// The step at a stop; `None` if it was not computed.
     pub fn step(&self, step: usize) -> Option<&Arc<RunStep>> {
         let first = self.steps.first()?.step;
         self.steps.get(step.checked_sub(first)?)

@@ -1,11 +1,11 @@
-//! Commands as a person can paste them into a shell.
+//! Commands to paste into a shell.
 
 use serde_json::Value;
 
 use sightline_track::settings::Changes;
 use sightline_track::target::Designation;
 
-/// A word as a POSIX shell reads it, in quotes where it must be.
+/// Quotes a word for a POSIX shell if necessary.
 pub fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:,=@%+".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
@@ -15,7 +15,7 @@ pub fn quoted(word: &str) -> String {
     }
 }
 
-/// Changed settings as arguments of `sightline track` and `sightline export`, each behind a space.
+/// Changed settings as arguments of `sightline track` and `sightline export`, each preceded by a space.
 pub(crate) fn settings_arguments(changes: &Changes) -> String {
     let argument = |(key, value): (&String, &Value)| {
         let value = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
@@ -24,7 +24,7 @@ pub(crate) fn settings_arguments(changes: &Changes) -> String {
     changes.iter().map(argument).collect()
 }
 
-/// The command that designates a target and tracks it; `drive` is what the command line opens.
+/// The command that designates a target and tracks it; `drive` is the argument that names the drive.
 pub fn track(drive: &str, designation: Designation, changes: &Changes) -> String {
     let Designation { step, pixel, camera } = designation;
     let camera = camera.map_or_else(String::new, |camera| format!(" --camera {camera}"));
@@ -33,27 +33,27 @@ pub fn track(drive: &str, designation: Designation, changes: &Changes) -> String
     format!("sightline track {} --target {},{}{camera}{from}{settings}", quoted(drive), pixel.x, pixel.y)
 }
 
-/// Writes the header with the access token; `printf` is part of the shell and no program of its own.
+/// Writes the header with the access token; `printf` is a shell built-in, so the token is not visible to other users.
 pub const WITH_TOKEN: &str = "printf 'Authorization: Bearer %s' \"$SIGHTLINE_TOKEN\"";
 
-/// A request over HTTP, to be written as `curl`.
+/// An HTTP request, as a `curl` command.
 #[derive(Clone, Copy, Debug)]
 pub struct Curl<'a> {
     /// Its method.
     pub method: &'a str,
-    /// Its whole address.
+    /// Its complete URL.
     pub url: &'a str,
-    /// Its JSON body.
+    /// Its JSON body; `None` without one.
     pub body: Option<&'a str>,
-    /// The revision that was read, for `If-Match`.
+    /// The revision for `If-Match`; `None` without the header.
     pub revision: Option<u64>,
-    /// The file into which the answer goes; none for the standard output.
+    /// The output file; `None` for standard output.
     pub file: Option<&'a str>,
 }
 
 impl Curl<'_> {
-    /// The command: silent but for problems, which make it fail. The page does not have the access token: the shell reads
-    /// it from `SIGHTLINE_TOKEN`, and hands it over by the standard input, because all users see the arguments of a program.
+    /// The command; it prints errors only, and fails on HTTP errors. The page does not have the access token: the shell
+    /// reads it from `SIGHTLINE_TOKEN` and passes it by standard input, because all users can see a program's arguments.
     pub fn text(&self) -> String {
         let mut text = format!("{WITH_TOKEN} | curl -fsS -H @-");
         if self.method != "GET" {
@@ -67,7 +67,7 @@ impl Curl<'_> {
             text.push_str(&format!(" -H {}", quoted(&format!("If-Match: \"{revision}\""))));
         }
         if let Some(body) = self.body {
-            // Raw, because a body that begins with @ would be the name of a file.
+            // Raw, because `--data` reads a file if the body begins with @.
             text.push_str(&format!(" -H 'Content-Type: application/json' --data-raw {}", quoted(body)));
         }
         text

@@ -3,8 +3,8 @@
 //! ```text
 //! StepTrace (stages) + StepTruth (world) ──► RunStep ──► StepRow
 //! ```
-//! Crates with stages cannot name these types: [`crate::track`] adds the comparison after the last stage.
-//! Page, REST and files contain the serialised form (`serialised`), in which arrays are left out.
+//! Stage crates do not depend on these types: [`crate::track`] adds the comparison after the last stage. Viewer, REST and
+//! files use the serialised form (`serialised`), which omits arrays.
 
 mod row;
 mod serialised;
@@ -25,11 +25,11 @@ use sightline_world::target_truth::StepTruth;
 pub struct RunStep {
     /// The results of the stages.
     pub trace: StepTrace,
-    /// The comparison with the truth; `None` where the truth is unknown.
+    /// The comparison with the truth; `None` if the truth is unknown.
     pub truth: Option<StepTruth>,
-    /// How vision measured the motion to this stop; `None` where it did not.
+    /// The motion to this stop as measured by visual odometry; `None` if it was not measured.
     pub odometry: Option<Box<MeasuredMotion>>,
-    /// What the stages took, where they were computed here; no part of the record.
+    /// The measured times of the stages; not part of the record, and empty if they were not measured.
     pub took: Took,
 }
 
@@ -48,7 +48,7 @@ impl DerefMut for RunStep {
 }
 
 impl RunStep {
-    /// This step as one line.
+    /// The row of this step.
     pub fn row(&self) -> StepRow {
         let evidence = self.template();
         let scale_roll = evidence.and_then(|e| e.scale_roll.as_ref());
@@ -93,7 +93,7 @@ impl RunStep {
         }
     }
 
-    /// Why an update was rejected, what is wrong with the stop's files, or where the drive is paused.
+    /// Why an update was rejected, the fault of the stop's files, or where the drive is paused.
     fn reason(&self) -> Option<String> {
         self.why_incomplete().or_else(|| self.verdict()?.reason.clone())
     }
@@ -103,7 +103,7 @@ impl RunStep {
         gates.filter(|gate| !gate.passed).cloned().collect()
     }
 
-    /// Whether the step was lost although its evidence was right.
+    /// Whether the state is `lost` or `failed` although the located pixel was within tolerance of the truth.
     pub fn is_false_loss(&self) -> bool {
         let within = |t: &StepTruth| t.err_px.is_some_and(|e| e <= t.tolerance_px);
         self.update.state.is_lost() && self.truth.as_ref().is_some_and(within)

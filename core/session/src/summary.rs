@@ -9,10 +9,10 @@ use sightline_track::target::TrackingState;
 /// The verdict on a whole run against the truth.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Summary {
-    /// Steps run, the designation included.
+    /// Number of steps, the designation included.
     pub steps: usize,
-    /// Steps at which the tracker did not look for the target: visual odometry ran alone, or the mast was pointed at another target
-    /// and this one was out of view.
+    /// Steps at which the tracker did not search for the target: visual odometry ran alone, or the mast was pointed at
+    /// another target and this one was out of view.
     pub steps_not_searched: usize,
     /// Steps that were tracked; null without truth.
     pub steps_tracked: Option<usize>,
@@ -24,13 +24,13 @@ pub struct Summary {
     pub false_lost: Option<usize>,
     /// Whether the last step was tracked; null without truth.
     pub run_tracked: Option<bool>,
-    /// Error of the last step, px.
+    /// Error of the last searched step, px; null without truth or position.
     pub final_err_px: Option<f64>,
-    /// Error of the last step, m.
+    /// Error of the last searched step, m; null without truth.
     pub final_err_m: Option<f64>,
 }
 
-/// Sums up a run.
+/// Computes the verdict on a run.
 pub fn summarise<'a>(steps: impl IntoIterator<Item = &'a RunStep>) -> Summary {
     let mut summary = Summary::default();
     for step in steps {

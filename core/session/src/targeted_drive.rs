@@ -1,4 +1,4 @@
-//! A targeted drive from its first stop to its end, without a session: what the command line, studies and tests drive.
+//! A targeted drive from its first stop to its end without a session, for the command line, studies and tests.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -16,25 +16,25 @@ use sightline_rover::driving::{Cycle, DriveCommand, Ending, HazardMaps, WaitingT
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
 
-/// A drive towards one target, or to several in turn.
+/// A drive to one target, or to several in turn.
 pub struct TargetedDrive {
     /// The world, at the stop of the last step.
     pub world: DrivenTraverse,
     /// The command.
     pub command: DriveCommand,
-    /// The number of the target that the rover drives to, in the order of their visits.
+    /// The index of the current target in the order of visits.
     pub target: usize,
-    /// The steps of that target so far; the first is the designation.
+    /// The steps of the current target so far; the first is the designation.
     pub steps: Vec<Arc<RunStep>>,
-    /// The decisions at the stops of the steps, one fewer than there are steps until the drive has ended.
+    /// The decisions at the stops of the steps; one fewer than the steps until the drive has ended.
     pub cycles: Vec<Cycle>,
     /// The hazard maps of the stops so far.
     pub maps: HazardMaps,
-    /// The visits that have ended, of a drive to several targets.
+    /// The completed visits of a drive to several targets.
     pub visits: Vec<Visit>,
     /// The settings of the last step.
     settings: Settings,
-    /// The steps of the targets to which it drives afterwards.
+    /// The steps of the following targets.
     then: VecDeque<Vec<Arc<RunStep>>>,
 }
 
@@ -42,7 +42,7 @@ impl TargetedDrive {
     /// Designates the target at the first stop and takes the command.
     ///
     /// # Errors
-    /// A pixel without a 3-D position, a command that makes no sense for the target, or [`Error::Cancelled`].
+    /// Fails for a pixel without a 3-D position, or a command that is invalid for the target, and with [`Error::Cancelled`].
     pub fn begin(
         world: DrivenTraverse,
         designation: Designation,
@@ -53,10 +53,10 @@ impl TargetedDrive {
         Self::begin_to(world, &[designation], command, settings, cancel)
     }
 
-    /// The same for several targets, which are visited in this order.
+    /// As [`Self::begin`], for several targets, which are visited in this order.
     ///
     /// # Errors
-    /// As [`Self::begin`], and no target at all.
+    /// As [`Self::begin`], and for an empty list of targets.
     pub fn begin_to(
         world: DrivenTraverse,
         targets: &[Designation],
@@ -98,11 +98,11 @@ impl TargetedDrive {
         self.cycles.last()?.ending.clone()
     }
 
-    /// Decides at the last stop and drives to the next, where all targets are tracked; false once the drive to this target has
-    /// ended.
+    /// Decides at the last stop, drives to the next one, and tracks all targets there. Returns false once the drive to this
+    /// target has ended.
     ///
     /// # Errors
-    /// [`Error::Cancelled`], or ground that cannot be driven on; the drive is then as it was before.
+    /// [`Error::Cancelled`], or an error for ground that cannot be driven on; the drive is then unchanged.
     pub fn advance(&mut self, settings: &Settings, cancel: Cancel<'_>) -> Result<bool> {
         if self.ending().is_some() {
             return Ok(false);
@@ -139,7 +139,7 @@ impl TargetedDrive {
         Ok(true)
     }
 
-    /// The steps at the last stop of the targets that are visited afterwards; `None` for one that has it.
+    /// The steps of the following targets at the last stop; `None` for a target that already has it.
     fn track_others(&self, settings: &Settings, cancel: Cancel<'_>) -> Result<Vec<Option<Arc<RunStep>>>> {
         let traverse = self.world.traverse();
         let track = |steps: &Vec<Arc<RunStep>>| {
@@ -154,8 +154,8 @@ impl TargetedDrive {
         self.then.iter().map(track).collect()
     }
 
-    /// Sends the rover to the next target once the drive to the present one has ended, and notes that visit; false where there is
-    /// no next one, or the rover cannot drive on. Then [`Self::advance`] goes on.
+    /// Records the visit to the current target once its drive has ended, and begins the drive to the next target, which
+    /// [`Self::advance`] continues. Returns false if there is no next target, or the rover cannot drive on.
     pub fn visit_next(&mut self) -> bool {
         let Some(ending) = self.ending() else { return false };
         if !self.then.is_empty() || !self.visits.is_empty() {
@@ -171,15 +171,16 @@ impl TargetedDrive {
         self.command.since = self.steps.last().map(|last| last.step);
         self.steps = steps;
         self.target += 1;
-        // The decision of this stop is made anew, for the next target.
+        // The decision at this stop is repeated for the next target.
         self.cycles.pop();
         true
     }
 
-    /// Gives the rover another command where it stands, once the drive under the present one has ended; [`Self::advance`] goes on.
+    /// Continues an ended drive from its last stop under another command; call [`Self::advance`] afterwards.
     ///
     /// # Errors
-    /// A command that makes no sense for the target, and a drive that has not ended or cannot go on; nothing has changed then.
+    /// Fails for a command that is invalid for the target, and for a drive that has not ended or cannot continue; the drive
+    /// is then unchanged.
     pub fn go_on(&mut self, command: DriveCommand) -> Result<()> {
         let ending = self.ending().filter(|ending| ending.reason.is_of_target());
         let (Some(_), Some(first), Some(last)) = (ending, self.steps.first(), self.steps.last()) else {
@@ -188,17 +189,17 @@ impl TargetedDrive {
         let command = DriveCommand { since: Some(last.step), waiting: waiting(&self.then), ..command };
         check_command(self.world.traverse(), &command, &first.trace)?;
         self.command = command;
-        // The decision of this stop is made anew.
+        // The decision at this stop is repeated.
         self.cycles.pop();
         Ok(())
     }
 
-    /// The outcome so far, for the present target.
+    /// The outcome so far, for the current target.
     pub fn summary(&self) -> DriveSummary {
         summary(&self.world, &self.command, &self.steps, &self.cycles)
     }
 
-    /// Why the drive stopped; `None` while it goes on, and where it has arrived.
+    /// Why the drive stopped; `None` while it goes on, and after arrival.
     pub fn why(&mut self) -> Option<StopExplanation> {
         let (traverse, maps) = (self.world.traverse(), &mut self.maps);
         let tracked = (&self.steps[..], &self.settings);
@@ -206,7 +207,7 @@ impl TargetedDrive {
     }
 }
 
-/// The targets of these steps as those that wait.
+/// The targets of these steps as waiting targets.
 fn waiting(then: &VecDeque<Vec<Arc<RunStep>>>) -> Vec<WaitingTarget> {
     then.iter().filter_map(|steps| Some(waiting_target(&steps.first()?.trace))).collect()
 }

@@ -1,7 +1,5 @@
-//! What the stages of a stop take: on Mars, by the model of [`FlightTime`], and on this machine, as the server measured them
-//! (the images of a simulated stop are rendered before).
-//!
-//! Unit: s.
+//! Times of the stages of a stop, s: on Mars by the model [`FlightTime`], and on this machine as measured by the server
+//! (without rendering the images of a simulated stop).
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -16,13 +14,13 @@ use crate::step::RunStep;
 pub struct StageTime {
     /// The stage.
     pub stage: CycleStage,
-    /// On Mars, s.
+    /// Modelled time on Mars, s.
     pub flight_s: f64,
-    /// On this machine, when the step was computed, s; null where it was not measured.
+    /// Measured time on this machine, s; null if it was not measured.
     pub own_s: Option<f64>,
 }
 
-/// The measured times of the stages of a step. They are no part of its record: steps are equal whatever they took.
+/// The measured times of the stages of a step, s. They are not part of its record, so all values compare as equal.
 #[derive(Clone, Debug, Default)]
 pub struct Took(pub Vec<(CycleStage, f64)>);
 
@@ -32,7 +30,7 @@ impl PartialEq for Took {
     }
 }
 
-/// The times of a step's stages in running order; `drive_s` is the duration of the drive from its stop, s, of a drive on commands.
+/// The times of a step's stages in running order; `drive_s` is the duration of the commanded drive from its stop, s.
 pub fn times(step: &RunStep, drive_s: Option<f64>) -> Vec<StageTime> {
     let pointing = &step.point_mast;
     let sizes = [pointing.left.size, pointing.right.size];

@@ -1,6 +1,6 @@
-//! The tracker over a traverse: one step of a run with its comparison against the truth.
+//! The tracker over a traverse: the steps of a run, with their comparison with the truth.
 //!
-//! Page, REST and command line all come through these functions, so that they show the same numbers.
+//! Viewer, REST and command line all use these functions, so that they show the same numbers.
 
 use crate::step::RunStep;
 use crate::times::Took;
@@ -15,19 +15,19 @@ use sightline_track::target::Designation;
 use sightline_track::trace::StepTrace;
 use sightline_world::target_truth::{TargetTruth, TruthSource};
 
-/// A traverse that can be tracked and, where its truth is known, judged.
+/// A traverse that can be tracked and, if its truth is known, evaluated.
 pub trait Drive: Stops + TruthSource {}
 impl<T: Stops + TruthSource> Drive for T {}
 
-/// The first step of a run.
+/// Computes the first step of a run, the designation.
 ///
 /// # Errors
-/// [`sightline_geometry::error::Error::Target`] when there is no such pixel or no 3-D position under it; file errors.
+/// [`sightline_geometry::error::Error::Target`] if there is no such pixel or no 3-D position at it; file errors.
 pub fn designate<D: Drive>(drive: &D, designation: Designation, settings: &Settings) -> Result<RunStep> {
     designate_until(drive, designation, settings, Cancel::default())
 }
 
-/// [`designate`], which ends soon after `cancel` is requested.
+/// As [`designate`], and stops soon after `cancel` is requested.
 ///
 /// # Errors
 /// As [`designate`], and [`sightline_geometry::error::Error::Cancelled`].
@@ -43,7 +43,7 @@ pub fn designate_until<D: Drive>(
     Ok(compared(drive, trace, None))
 }
 
-/// Adds the warning of a shadow on the window (R21), which only a source of truth knows.
+/// Adds the warning about a shadow on the window (R21), which needs the truth.
 fn warn_of_shadow<D: Drive>(drive: &D, trace: &mut StepTrace, settings: &Settings) {
     let Designation { step, pixel, camera } = trace.update.target.designation;
     let warning = drive
@@ -55,12 +55,12 @@ fn warn_of_shadow<D: Drive>(drive: &D, trace: &mut StepTrace, settings: &Setting
     }
 }
 
-/// The step after `last`; `first` is the run's designation.
+/// Computes the step after `last`; `first` is the run's designation.
 pub fn advance<D: Drive>(drive: &D, first: &StepTrace, last: &StepTrace, settings: &Settings) -> RunStep {
     compared(drive, pipeline::run_step(drive, &last.update, settings), Some(first))
 }
 
-/// The step after the last one of a run, as a person may have changed it and may cancel it.
+/// The inputs of the next step of a run, with optional changes, pause and cancellation.
 #[derive(Clone, Copy)]
 pub struct NextStep<'a> {
     /// The run's designation.
@@ -69,13 +69,13 @@ pub struct NextStep<'a> {
     pub last: &'a StepTrace,
     /// The configuration.
     pub settings: &'a Settings,
-    /// Pixel of the left image at which a person put the prediction, px.
+    /// The displaced prediction in the left image, px; `None`: by dead reckoning.
     pub prediction_px: Option<Pixel>,
     /// The stage before which the step is paused, from `point_mast` to `update`; `None`: the whole step.
     pub before: Option<CycleStage>,
     /// Called at the end of every stage.
     pub ended: Option<&'a dyn Fn(CycleStage)>,
-    /// Read several times during the step.
+    /// Checked several times during the step.
     pub cancel: Cancel<'a>,
 }
 
@@ -109,7 +109,7 @@ pub fn run<D: Drive>(drive: &D, designation: Designation, settings: &Settings) -
 pub(crate) fn compared<D: Drive>(drive: &D, trace: StepTrace, first: Option<&StepTrace>) -> RunStep {
     let target = &first.unwrap_or(&trace).update.target;
     let truth = TargetTruth::new(drive, target.designation, Some(&target.position_in_rover));
-    // The comparison is one with the update.
+    // The comparison needs the update.
     let truth = truth.filter(|_| !trace.is_begun()).and_then(|truth| truth.compare(&trace));
     let odometry = drive.measured_motion(trace.step).cloned().map(Box::new);
     RunStep { trace, truth, odometry, took: Took::default() }

@@ -1,4 +1,4 @@
-//! What of a session travels: the view that pages and scripts read, and the saved form that survives a restart.
+//! Serialised forms of a session: the view that clients read, and the saved form that survives a restart.
 
 use std::collections::BTreeMap;
 
@@ -14,139 +14,139 @@ use crate::visits::Visit;
 use sightline_track::settings::{Changes, Settings};
 use sightline_track::target::Designation;
 
-/// The version of the saved form that this code reads and writes.
+/// The version of the saved format that this code reads and writes.
 pub const SAVED_FORMAT: u32 = 1;
 
-/// A session as pages and scripts see it.
+/// A session as clients receive it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct SessionView {
     /// The session's name in paths.
     pub id: String,
     /// The traverse's name in paths.
     pub traverse: String,
-    /// How many stops the traverse has.
+    /// Number of stops of the traverse.
     pub stop_count: usize,
-    /// What is looked at.
+    /// The current selection.
     pub cursor: Cursor,
     /// The targets that were not removed.
     pub targets: Vec<TargetView>,
-    /// The conditions that are looked for; `…/breakpoints` says what they hit.
+    /// The breakpoints; `…/breakpoints` returns their hits.
     #[serde(default)]
     pub breakpoints: Vec<Breakpoint>,
-    /// Who drives, and how; null where nobody was told to.
+    /// The driving run and its command; null before the first drive command.
     #[serde(default)]
     pub steering: Option<Steering>,
 }
 
-/// A target as pages and scripts see it.
+/// A target as clients receive it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct TargetView {
     /// Its number in paths.
     pub number: usize,
-    /// What the person calls it.
+    /// Its label.
     pub label: String,
-    /// How it was designated.
+    /// Its designation.
     pub designation: Designation,
     /// Its runs that were not removed, by number.
     pub runs: Vec<RunView>,
 }
 
-/// A run as pages and scripts see it.
+/// A run as clients receive it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct RunView {
     /// Its number in paths.
     pub number: usize,
-    /// Where it left another run.
+    /// Its fork from a parent run; null for the first run.
     pub fork: Option<Fork>,
     /// The settings that differ from the defaults.
     #[schema(value_type = Object)]
     pub changes: Changes,
     /// The configuration.
     pub settings: Settings,
-    /// The changed settings that have no effect beside the others, each with the condition under which it has one.
+    /// The changed settings that have no effect with the other settings, each with the condition for an effect.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub without_effect: BTreeMap<String, String>,
-    /// One line a step, so far.
+    /// One row for each step so far.
     pub rows: Vec<StepRow>,
     /// Whether the last stop was reached.
     pub complete: bool,
-    /// Why it stopped before.
+    /// Why it stopped before the last stop; null if it did not.
     pub stopped: Option<String>,
-    /// How many runs are before it in the queue of the server, those that are being computed included; null unless it waits.
+    /// Number of runs before it in the queue of the server, including those being computed; null unless it waits.
     #[serde(default)]
     pub waits_for: Option<usize>,
     /// The verdict so far.
     pub summary: Summary,
 }
 
-/// What a waiting run waits for, in words.
+/// The text for a run that waits for `before` others.
 pub fn waiting_for(before: usize) -> String {
     format!("waiting for {before} {} before it", if before == 1 { "run" } else { "runs" })
 }
 
-/// What a person did, from which the session comes again.
+/// The saved form of a session: the person's actions, from which it is recomputed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SavedSession {
-    /// Version of this form.
+    /// The version of this format.
     pub format: u32,
     /// The session's name.
     pub id: String,
     /// The traverse's name.
     pub traverse: String,
-    /// What was looked at.
+    /// The selection.
     pub cursor: Cursor,
     /// The targets, by number.
     pub targets: Vec<SavedTarget>,
-    /// The conditions that were looked for.
+    /// The breakpoints.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub breakpoints: Vec<Breakpoint>,
-    /// Who drove, and how.
+    /// The driving run and its command.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub steering: Option<Steering>,
-    /// The visits that had ended, of a drive to several targets.
+    /// The completed visits of a drive to several targets.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub visits: Vec<Visit>,
 }
 
-/// A target as it was designated, and the configurations tried on it.
+/// A saved target with its runs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SavedTarget {
-    /// What the person calls it.
+    /// Its label.
     pub label: String,
-    /// How it was designated.
+    /// Its designation.
     pub designation: Designation,
-    /// Whether the person removed it.
+    /// Whether it was removed.
     pub removed: bool,
-    /// Its runs, by number.
+    /// Its runs, by number; empty if it can no longer be restored.
     pub runs: Vec<SavedRun>,
 }
 
-/// A configuration tried on a target.
+/// A saved run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SavedRun {
-    /// Where it left another run.
+    /// Its fork from a parent run; null for the first run.
     pub fork: Option<Fork>,
-    /// The whole configuration: defaults may change between versions.
+    /// The complete configuration, because defaults may change between versions.
     pub settings: Settings,
-    /// The step after which the person stopped it.
+    /// The step after which it was stopped by a person.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stop_after: Option<usize>,
-    /// Whether the person removed it.
+    /// Whether it was removed.
     #[serde(default, skip_serializing_if = "is_false")]
     pub removed: bool,
 }
 
-// The signature is that of serde.
+// serde requires this signature.
 #[allow(clippy::trivially_copy_pass_by_ref)]
 fn is_false(value: &bool) -> bool {
     !value
 }
 
 impl Session {
-    /// The session as pages and scripts see it.
+    /// The session as clients receive it.
     pub fn view(&self) -> SessionView {
         let live = self.targets.iter().enumerate().filter(|(_, record)| !record.removed);
         SessionView {
@@ -160,12 +160,12 @@ impl Session {
         }
     }
 
-    /// A run as pages and scripts see it.
+    /// A run as clients receive it.
     pub fn run_view(&self, number: usize, run: &Run) -> RunView {
         self.run_view_from(number, run, 0)
     }
 
-    /// A run with its rows from the one at `from_row` on, counted from 0: what is new for somebody who has that many.
+    /// The run with its rows from `from_row` on, counted from 0: the new rows for a client that already has `from_row` rows.
     pub fn run_view_from(&self, number: usize, run: &Run, from_row: usize) -> RunView {
         let changes = run.settings.changes();
         RunView {
@@ -182,7 +182,7 @@ impl Session {
         }
     }
 
-    /// What the person did.
+    /// The saved form.
     pub fn saved(&self) -> SavedSession {
         let saved_run = |run: &Run| SavedRun {
             fork: run.fork,

@@ -1,8 +1,8 @@
-//! A drive to several targets, one after the other (R207–R209): which were visited, and the next one.
+//! A drive to several targets in turn (R207–R209): the completed visits, and the next target.
 //!
-//! All targets are tracked at every stop while the rover drives to one of them. Those that are out of view, as the mast is pointed
-//! at that one, are carried by the pose estimate until the mast looks at them. A target that the tracker gave up, or whose goal cannot be reached, is dropped;
-//! what concerns the rover itself (slip, tilt, a stall, time) ends the whole drive.
+//! All targets are tracked at every stop while the rover drives to one of them. Targets out of view, because the mast is
+//! pointed at the current one, are propagated by the pose estimate until the mast is pointed at them. A target that failed,
+//! or whose goal cannot be reached, is skipped; conditions of the rover itself (slip, tilt, a stall, time) end the drive.
 
 use std::sync::Arc;
 
@@ -18,32 +18,32 @@ use sightline_recordings::DrivenTraverse;
 use sightline_rover::driving::{DriveCommand, Ending, StopReason, WAITING_MAX, WaitingTarget};
 use sightline_track::trace::StepTrace;
 
-/// A target that the rover was sent to, and how that part of the drive ended.
+/// A visit: the drive to one target, with its end.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Visit {
     /// The target's number.
     pub target: usize,
-    /// The stop at which the rover was sent to it.
+    /// The stop at which the drive to it began.
     pub since: usize,
-    /// The stop at which that ended.
+    /// The stop at which the drive to it ended.
     pub until: usize,
     /// Why it ended.
     pub reason: StopReason,
-    /// Details of the reason; null where there are none.
+    /// Details of the reason; null without details.
     #[serde(default)]
     pub detail: Option<String>,
-    /// Root cause of an end before the goal, its evidence, and changes that alter the decision there; null where it has arrived.
+    /// Root cause of an end before the goal, its evidence, and changes that alter the decision there; null after arrival.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub why: Option<StopExplanation>,
     /// Distance between the estimated and the true target in the rover frame at that stop, m; null without truth.
     pub target_error_m: Option<f64>,
-    /// Horizontal distance of the true rover from the goal that follows from the true target, m; null without truth.
+    /// Horizontal distance of the true rover from the goal computed from the true target, m; null without truth.
     pub goal_error_m: Option<f64>,
 }
 
 impl Visit {
-    /// The visit to a target that ended at the last of a run's steps.
+    /// The visit that ended at the last step of a run.
     pub(crate) fn of(
         world: &DrivenTraverse,
         command: &DriveCommand,
@@ -66,7 +66,7 @@ impl Visit {
     }
 }
 
-/// A target that waits, by the step at which it was designated.
+/// The waiting target of a designation step.
 pub(crate) fn waiting_target(first: &StepTrace) -> WaitingTarget {
     let target = &first.update.target;
     WaitingTarget {
@@ -76,11 +76,11 @@ pub(crate) fn waiting_target(first: &StepTrace) -> WaitingTarget {
 }
 
 impl Session {
-    /// Notes how the drive to its target ended at the last stop, and `why`, and sends the rover to the next one; returns the target and run
-    /// that drive now. `None` where there is no next one, or the rover cannot drive on.
+    /// Records the visit that ended at the last stop, with its cause `why`, and begins the drive to the next target. Returns
+    /// the new target and run; `None` if there is no next target, or the rover cannot drive on.
     ///
     /// # Errors
-    /// [`Error::Request`] when nobody drives.
+    /// [`Error::Request`] if no run drives.
     pub fn visit_next(
         &mut self,
         world: &DrivenTraverse,
@@ -92,7 +92,7 @@ impl Session {
         let run = self.run(steering.target, steering.run)?;
         let visit = Visit::of(world, &steering.command, (steering.target, run.whole_steps()), ending, why);
         let until = visit.until;
-        // A drive that was continued, under a changed command perhaps, ends the same visit again.
+        // A continued drive, possibly under a changed command, ends the same visit again.
         self.visits.retain(|known| (known.target, known.since) != (visit.target, visit.since));
         if !steering.then.is_empty() || !self.visits.is_empty() {
             self.visits.push(visit);
@@ -111,7 +111,7 @@ impl Session {
         Ok(Some((target, run)))
     }
 
-    /// The targets with these numbers as those that wait; one that is not located yet is left out.
+    /// The targets with these numbers as waiting targets; those not yet located are left out.
     pub(crate) fn waiting(&self, then: &[usize]) -> Vec<WaitingTarget> {
         let first = |target: &usize| self.run(*target, self.newest_run(*target)?).ok()?.steps.first();
         then.iter().filter_map(|target| Some(waiting_target(&first(target)?.trace))).collect()
@@ -122,10 +122,10 @@ impl Session {
         self.target(target).ok()?.runs.iter().rposition(|run| !run.removed)
     }
 
-    /// Refuses a list of further targets that no drive can have.
+    /// Checks the list of following targets.
     ///
     /// # Errors
-    /// [`Error::Setting`] that names the entry.
+    /// [`Error::Setting`] with the entry, if the list is too long, or a target does not exist or is listed twice.
     pub(crate) fn check_then(&self, target: usize, then: &[usize]) -> Result<()> {
         if then.len() > WAITING_MAX {
             let problem = format!(

@@ -1,8 +1,8 @@
-//! What if: one step of a run computed again from what its previous step left, with changed settings and perhaps a
-//! displaced prediction. Nothing is stored; a run that is to go on like that is a fork (R97).
+//! What-if: recomputes one step of a run from the state after its previous step, with changed settings or a displaced
+//! prediction. Nothing is stored; to continue with the change, fork the run (R97).
 //!
-//! The displaced prediction is carried into the rover frame by [`sightline_track::stages::predict::displaced`]: along the line of
-//! sight of the pixel, as far away as before, its covariance kept.
+//! [`sightline_track::stages::predict::displaced`] converts the displaced prediction to the rover frame: on the line of
+//! sight of the pixel, with unchanged range and covariance.
 
 use nalgebra::Matrix2;
 use serde::{Deserialize, Serialize};
@@ -21,18 +21,18 @@ use sightline_track::trace::{ArrayName, ArrayView};
 use sightline_vision::image::PixelRect;
 use sightline_world::target_truth::StepTruth;
 
-/// What is to be tried at a step.
+/// Changes to try at a step.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WhatIf {
-    /// The settings that change against the run's, by name.
+    /// The settings that differ from those of the run, by name.
     #[serde(default)]
     #[schema(value_type = Object)]
     pub settings: Changes,
-    /// Where to put the prediction in the left image, px; left out: where the run has it.
+    /// The displaced prediction in the left image, px; default: that of the run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prediction_px: Option<Pixel>,
-    /// The arrays to send along, by name.
+    /// The arrays to return, by name.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub arrays: Vec<ArrayName>,
 }
@@ -44,26 +44,26 @@ impl WhatIf {
     }
 }
 
-/// From what a step is computed again.
+/// The recorded data from which a step is recomputed.
 #[derive(Clone, Copy, Debug)]
 pub struct Base<'a> {
     /// The run's designation.
     pub first: &'a RunStep,
-    /// What the previous step left, with the image of its template; none at the designation.
+    /// The previous step, with the image of its template; `None` at the designation.
     pub last: Option<&'a RunStep>,
     /// The step as it was recorded.
     pub recorded: &'a RunStep,
     /// The run's configuration.
     pub settings: &'a Settings,
-    /// Where the run has the prediction of this step in the left image, where a person put it, px.
+    /// The displaced prediction of this step in the run, left image, px; `None`: by dead reckoning.
     pub prediction_px: Option<Pixel>,
 }
 
-/// The step, tried.
+/// Recomputes the step with the changes.
 ///
 /// # Errors
-/// [`Error::Setting`] for a bad change; [`Error::Request`] when a designation is to be displaced or the pixel is no
-/// number; at a designation those of [`track::designate`]; [`Error::Cancelled`] soon after `cancel` is requested.
+/// [`Error::Setting`] for an invalid change; [`Error::Request`] for a displaced designation or a pixel that is not finite;
+/// at a designation as [`track::designate`]; [`Error::Cancelled`] soon after `cancel` is requested.
 pub fn try_step<D: Drive>(
     drive: &D,
     base: Base<'_>,
@@ -82,7 +82,7 @@ pub fn try_step<D: Drive>(
         }
         (Some(last), prediction_px) => {
             let prediction_px = prediction_px.or(base.prediction_px);
-            // A step of a paused drive is tried up to the pause.
+            // A step of a paused drive is computed up to the pause.
             let before = base.recorded.paused_before();
             NextStep {
                 first: base.first,
@@ -98,46 +98,46 @@ pub fn try_step<D: Drive>(
     }
 }
 
-/// A tried step as it is drawn over the recorded one.
+/// The data of a tried step that are drawn over the recorded one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Ghost {
-    /// What was tried.
+    /// The changes.
     pub what_if: WhatIf,
-    /// The step as one line.
+    /// The row of the step.
     pub row: StepRow,
-    /// Its criteria with values and limits; null at a designation or a stop with damaged files.
+    /// Its gates with values and limits; null at a designation or a stop with damaged files.
     pub verdict: Option<Verdict>,
-    /// What could not be found and why, as one sentence.
+    /// Why the target was not located, as one sentence; null if it was.
     pub missing: Option<String>,
-    /// The prediction in the left image, px.
+    /// The prediction in the left image, px; null at a designation or outside the view.
     pub predicted_left: Option<Pixel>,
     /// Its covariance, px².
     #[schema(value_type = Option<Vec<f64>>)]
     pub predicted_covariance_px2: Option<Matrix2<f64>>,
-    /// How the template matched: peak, second peak and region; null where nothing was matched.
+    /// The template match: peak, second peak and region; null without a match.
     #[serde(default)]
     pub matched: Option<TemplateMatch>,
-    /// The region searched, cut to the image.
+    /// The searched region, clipped to the image.
     pub search_window: Option<PixelRect>,
     /// Side of the template, px.
     pub template_size_px: u32,
-    /// How the template was prepared: scale and roll, or the warp by the surface's slope, px per px.
+    /// The preparation of the template: scale and roll, or the warp by the surface's slope, px per px.
     #[schema(value_type = Option<Vec<f64>>)]
     pub prepared_from_template: Option<Matrix2<f64>>,
-    /// Where the target was found in the left image, px.
+    /// The located position in the left image, px.
     pub left_pixel: Option<Pixel>,
-    /// Mean square of the error of that place against the designated point, px².
+    /// Mean square error of that position relative to the designated point, px².
     #[schema(value_type = Option<Vec<f64>>)]
     pub left_covariance_px2: Option<Matrix2<f64>>,
-    /// The comparison with the truth, where that is known.
+    /// The comparison with the truth; null if the truth is unknown.
     pub truth: Option<StepTruth>,
-    /// What changed against the recorded step.
+    /// The differences from the recorded step.
     pub deltas: Deltas,
-    /// The arrays that were asked for and reached.
+    /// The requested arrays that exist at this step.
     pub arrays: Vec<GhostArray>,
 }
 
-/// What a tried step has more than the recorded one; null where either has none.
+/// Values of a tried step minus those of the recorded one; null if either is missing.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Deltas {
     /// State of the recorded step.
@@ -148,9 +148,9 @@ pub struct Deltas {
     pub stereo_score: Option<f64>,
     /// Confidence of the locator.
     pub confidence: Option<f64>,
-    /// How far the found place moved in the left image, px.
+    /// Distance between the located positions in the left image, px.
     pub moved_px: Option<f64>,
-    /// How far the position moved in the rover frame, m.
+    /// Distance between the located positions in the rover frame, m.
     pub moved_m: Option<f64>,
     /// Error against the truth in the left image, px.
     pub err_px: Option<f64>,
@@ -165,12 +165,12 @@ pub struct GhostArray {
     pub name: ArrayName,
     /// Width and height.
     pub size: [u32; 2],
-    /// Row-major values; null where invalid.
+    /// Row-major values; null if invalid.
     pub values: Vec<Option<f32>>,
 }
 
 impl Ghost {
-    /// What is drawn of `tried` over `recorded`; `settings` are those that `tried` was computed with.
+    /// The data to draw of `tried` over `recorded`; `settings` are those of `tried`.
     pub fn new(what_if: WhatIf, tried: &RunStep, recorded: &RunStep, settings: &Settings) -> Self {
         let pointing = tried.prediction().map(|_| &tried.point_mast);
         let evidence = tried.template();
@@ -200,7 +200,7 @@ impl Ghost {
         }
     }
 
-    /// Whether the tried step is tracked against the truth; null without truth.
+    /// Whether the tried step is tracked; `None` without truth.
     pub fn is_right(&self) -> Option<bool> {
         self.truth.as_ref().and_then(|truth| truth.tracked)
     }
@@ -282,7 +282,7 @@ mod tests {
             (steps[1].template().unwrap().match_template.as_ref().unwrap(), ghost.matched.unwrap());
         assert!(matched.peak.pixel.distance(recorded.peak.pixel) < 0.01, "{:?}", matched.peak);
         assert_eq!((ghost.arrays[0].size, ghost.arrays[0].values.len()), ([123, 123], 123 * 123));
-        // Far enough away the target is not in the window, and the step is lost.
+        // With a larger displacement the target is outside the window, and the step is lost.
         let away = WhatIf { prediction_px: Some(predicted.offset(-75.0, 60.0)), ..WhatIf::default() };
         let tried = try_step(&world, base(&steps, 1, &settings), &away, Cancel::default()).unwrap();
         assert_ne!(tried.update.state, TrackingState::Tracking);

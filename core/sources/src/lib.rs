@@ -1,12 +1,12 @@
-//! For build scripts: a digest of the sources that decide a result, by which stored results of other code are
+//! For build scripts: a digest of the sources that determine a result, by which stored results of other code are
 //! recognised.
 //!
 //! ```text
 //! digest = SHA-256 over the files, sorted by path: path relative to its folder's parent, length, content
 //! ```
 //!
-//! The content of a Rust file is its tokens without comments and without modules under `#[cfg(test)]`; of any other
-//! file its bytes with line ends as LF. Files of tests (`tests.rs`, `…_tests.rs`, `tests/`) and Markdown are left out.
+//! The content of a Rust file is its tokens without comments and without modules under `#[cfg(test)]`; that of any other
+//! file is its bytes with line ends as LF. Test files (`tests.rs`, `…_tests.rs`, `tests/`) and Markdown are left out.
 //! The digest depends on neither the checkout's path, nor Git, nor formatting.
 
 use std::collections::BTreeSet;
@@ -17,8 +17,8 @@ use std::path::{Path, PathBuf};
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use sha2::{Digest, Sha256};
 
-/// Sets the environment variable `variable` of the package that is compiled to the digest of `sources`, and tells Cargo
-/// to run the build script again when one of them changes.
+/// Sets the environment variable `variable` of the compiled package to the digest of `sources`, and makes Cargo run the
+/// build script again when one of them changes.
 ///
 /// # Errors
 /// A source that cannot be read.
@@ -30,8 +30,8 @@ pub fn emit(variable: &str, sources: &[PathBuf]) -> io::Result<()> {
     Ok(())
 }
 
-/// The source folders of the package in `package` and of all packages `sightline-NAME` that it depends on, which are in
-/// the folders `NAME` of `core`.
+/// The source folders of the package in `package` and of all its dependencies `sightline-NAME`, which are in the folders
+/// `NAME` of `core`.
 ///
 /// # Errors
 /// A manifest that cannot be read.
@@ -47,7 +47,7 @@ pub fn with_dependencies(package: &Path, core: &Path) -> io::Result<Vec<PathBuf>
     Ok(found.into_iter().collect())
 }
 
-/// `NAME` of each dependency `sightline-NAME` of a manifest, those of tests and build scripts left out.
+/// `NAME` of each dependency `sightline-NAME` of a manifest, without dev and build dependencies.
 fn dependencies(manifest: &str) -> impl Iterator<Item = &str> {
     let lines = manifest.lines().skip_while(|line| line.trim() != "[dependencies]").skip(1);
     lines.take_while(|line| !line.starts_with('[')).filter_map(|line| {
@@ -96,7 +96,7 @@ fn collect(path: &Path, root: &Path, files: &mut Vec<(String, PathBuf)>) -> io::
     Ok(())
 }
 
-/// What of a file counts.
+/// The part of a file that counts.
 fn content(path: &Path) -> io::Result<Vec<u8>> {
     let bytes = fs::read(path)?;
     let Ok(text) = String::from_utf8(bytes.clone()) else { return Ok(bytes) };
@@ -112,7 +112,7 @@ fn content(path: &Path) -> io::Result<Vec<u8>> {
     Ok(written.into_bytes())
 }
 
-/// Writes tokens with one space between them, without comments of documentation and modules of tests.
+/// Writes tokens separated by one space, without doc comments and test modules.
 fn write(tokens: TokenStream, text: &mut String) {
     let tokens: Vec<TokenTree> = tokens.into_iter().collect();
     let mut at = 0;
@@ -133,7 +133,7 @@ fn write(tokens: TokenStream, text: &mut String) {
                 write(group.stream(), text);
                 text.push_str(close);
             }
-            // The signs of an operator stay together: `a - -b` is not `a -- b`.
+            // The characters of an operator stay together: `a - -b` is not `a -- b`.
             TokenTree::Punct(sign) if sign.spacing() == proc_macro2::Spacing::Joint => {
                 text.push(sign.as_char());
                 at += 1;
@@ -146,7 +146,7 @@ fn write(tokens: TokenStream, text: &mut String) {
     }
 }
 
-/// The number of tokens of the attribute with which `tokens` begin, if it is `name` or its arguments are `name`'s.
+/// Number of tokens of the attribute at the start of `tokens`, if it is `name` or of the form `name = …`.
 fn attribute(tokens: &[TokenTree], name: &str) -> Option<usize> {
     let mut at = 0;
     for sign in ['#', '!'] {
@@ -161,7 +161,7 @@ fn attribute(tokens: &[TokenTree], name: &str) -> Option<usize> {
     (text == name || text.starts_with(&format!("{name}="))).then_some(at + 1)
 }
 
-/// The number of tokens of the module under `#[cfg(test)]` with which `tokens` begin.
+/// Number of tokens of the `#[cfg(test)]` module at the start of `tokens`.
 fn test_module(tokens: &[TokenTree]) -> Option<usize> {
     let mut at = attribute(tokens, "cfg(test)")?;
     while let Some(TokenTree::Punct(punct)) = tokens.get(at)

@@ -1,13 +1,14 @@
-//! What became of a target in a drive whose poses may be corrected by vision: driven to the end or not, and why it was lost.
+//! Outcome of a target in a drive whose poses may be corrected by vision: tracked to the end or not, and the cause of
+//! its loss.
 //!
-//! A target is lost because of the pose in two ways, judged at the step from which it is not tracked any more:
+//! The pose causes a loss in two ways, judged at the first step from which the target is not tracked:
 //!
-//! * *window*: its true pixel lies farther from the predicted one, along x or y, than the match can reach,
-//!   `(search_window_px − template_size_px) / 2`, because the whole template lies in the window;
-//! * *correction*: it was found where it is (R116), and refused by nothing but the gates that limit how far the result may lie
-//!   from what the poses predict (`distance_correction_m`, `position_correction_m`).
+//! * *window*: the true pixel is farther from the predicted one, along x or y, than the match can reach,
+//!   `(search_window_px − template_size_px) / 2`, because the whole template must be inside the window;
+//! * *correction*: the target was located correctly (R116), and rejected only by the gates on the distance between the
+//!   result and the prediction (`distance_correction_m`, `position_correction_m`).
 //!
-//! The truth that the image does not show is *hidden*. Everything else is a matter of the match.
+//! A target that is not visible in the image is *hidden*. All other losses are attributed to the match.
 
 use serde::{Deserialize, Serialize};
 
@@ -17,47 +18,47 @@ use sightline_track::settings::Settings;
 
 use super::run::Fate;
 
-/// The gates that compare the result with what the poses predict.
+/// Gates on the distance between the result and the prediction from the poses.
 const CORRECTION_GATES: [&str; 2] = ["distance_correction_m", "position_correction_m"];
 
-/// What became of a target.
+/// Outcome of a target.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ByPose {
-    /// Whether it was tracked at the stop at which slip ended the drive; the stops after it were not driven.
+    /// Whether it was tracked at the stop at which slip ended the drive; the later stops were not driven.
     pub not_driven: bool,
-    /// From where on it was not tracked; `None` where it was at the last step.
+    /// The loss; `None` if the target was tracked at the last step.
     pub loss: Option<Loss>,
 }
 
-/// The step from which a target was not tracked any more.
+/// The first step from which a target was not tracked.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Loss {
-    /// The step.
+    /// Index of the step.
     pub step: usize,
-    /// What the tracker said there, lost or false.
+    /// State at that step: lost or false.
     pub fate: Fate,
-    /// Distance of the true pixel from the predicted one, px; `None` where either is in no image.
+    /// Distance between the true and the predicted pixel, px; `None` if either is outside the image.
     pub off_px: Option<f64>,
-    /// Why.
+    /// Cause of the loss.
     pub cause: LossCause,
 }
 
-/// Why a target was lost.
+/// Cause of a loss.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LossCause {
-    /// The pose: the prediction was so far off that the match could not reach the target.
+    /// Pose: the prediction was missing or so far off that the match could not reach the target.
     Window,
-    /// The pose: the target was found, and refused because it lay too far from what the poses predict.
+    /// Pose: the target was located, but rejected as too far from the prediction.
     Correction,
-    /// The target was hidden or out of the image.
+    /// The target was hidden or outside the image.
     Hidden,
-    /// The target was in reach; it was not found, or something else was taken for it.
+    /// The target was within reach, but was not found or was confused with something else.
     Match,
 }
 
 impl ByPose {
-    /// Takes in a step with what became of the target there.
+    /// Adds a step with its fate.
     pub(super) fn add(&mut self, trace: &RunStep, fate: Option<Fate>, settings: &Settings) {
         match fate {
             Some(Fate::Tracked) => self.loss = None,
@@ -87,7 +88,7 @@ impl Loss {
     }
 }
 
-/// Whether a right result was refused by nothing but the gates of its distance from the prediction.
+/// Returns whether a correct result was rejected only by the gates on its distance from the prediction.
 fn is_too_far(trace: &RunStep) -> bool {
     let gates = trace.verdict().map_or(&[][..], |verdict| &verdict.gates);
     let mut failed = gates.iter().filter(|gate| !gate.passed);

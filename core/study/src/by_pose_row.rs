@@ -1,4 +1,4 @@
-//! The columns of poses and their odometry in a study's table: what the drive's odometry did, and why targets were lost.
+//! Columns of poses and odometry in a study's table: performance of the drive's odometry, and causes of losses.
 
 use std::collections::BTreeMap;
 
@@ -12,27 +12,28 @@ use sightline_recordings::Traverse;
 use super::by_pose::{ByPose, Loss, LossCause};
 use super::run::Run;
 
-/// What odometry did in one drive, against the truth.
+/// Performance of odometry in one drive, against the truth.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DriveOdometry {
-    /// Stops that were planned.
+    /// Number of planned stops.
     pub stops_planned: usize,
-    /// Stops that were driven.
+    /// Number of driven stops.
     pub stops: usize,
-    /// Motions that were measured.
+    /// Number of measured motions.
     pub measured: usize,
-    /// Of these the accepted ones.
+    /// Number of accepted ones.
     pub accepted: usize,
-    /// Largest slip along of an accepted measurement, as a part of the wheels' motion.
+    /// Largest slip along the motion of an accepted measurement, as a fraction of the wheels' motion; `None` without
+    /// any.
     pub slip_max: Option<f64>,
-    /// Distance of the estimated pose from the true one at the last stop, site frame, m.
+    /// Distance between the estimated and the true pose at the last stop, m; `None` without truth.
     pub pose_err_m: Option<f64>,
-    /// The angle between them, degrees.
+    /// Angle between them, degrees.
     pub pose_err_deg: Option<f64>,
 }
 
 impl DriveOdometry {
-    /// What odometry did in a drive of which `planned` stops were planned.
+    /// Compares a drive with `planned` planned stops with its truth.
     pub fn of(drive: &Traverse, planned: usize) -> Self {
         let motions = || drive.index().stops.iter().filter_map(|stop| stop.odometry.as_ref());
         let accepted = || motions().filter(|motion| motion.update.accepted);
@@ -51,12 +52,12 @@ impl DriveOdometry {
         }
     }
 
-    /// Whether slip ended the drive.
+    /// Returns whether slip ended the drive.
     pub fn is_cut_short(&self) -> bool {
         self.stops < self.stops_planned
     }
 
-    /// Its columns.
+    /// Columns of the table.
     pub(super) fn columns(&self) -> BTreeMap<String, Value> {
         [
             ("stops_planned", self.stops_planned.into()),
@@ -72,7 +73,7 @@ impl DriveOdometry {
     }
 }
 
-/// Why targets were lost; empty where the study does not ask.
+/// Causes of losses; empty if the study does not record them.
 pub(super) fn columns(runs: &[&Run]) -> BTreeMap<String, Value> {
     let asked: Vec<&ByPose> = runs.iter().filter_map(|run| run.by_pose.as_ref()).collect();
     if asked.is_empty() {

@@ -1,10 +1,10 @@
-//! Whether a covariance can be trusted: NEES with its chi-square band, and the share inside 3σ.
+//! Calibration of covariances: NEES with its chi-square band, and the fraction inside 3σ.
 //!
-//! For an estimate with error e and covariance P, `NEES = eᵀ P⁻¹ e` follows χ² with 3 degrees of freedom where P
-//! is right. The mean over N independent runs lies in `[χ²₃N(2.5 %), χ²₃N(97.5 %)] / N` 95 times in 100: above it
-//! the covariance is too small, below it too large. Targets of one world share its poses, its light and its
-//! noise, so the number of independent runs lies between that of the worlds and that of the targets; both bands
-//! are given. *Inside 3σ*: Mahalanobis distance ≤ 3, which a perfect Gaussian is in 97.1 % of all cases.
+//! For an estimate with error e and covariance P, `NEES = eᵀ P⁻¹ e` follows χ² with 3 degrees of freedom if P is
+//! correct. The mean over N independent runs is in `[χ²₃N(2.5 %), χ²₃N(97.5 %)] / N` in 95 % of all cases: above it the
+//! covariance is too small, below it too large. Targets of one world share its poses, light and noise, so the number of
+//! independent runs is between those of worlds and of targets; both bands are reported. *Inside 3σ*: Mahalanobis
+//! distance ≤ 3, true for 97.1 % of a Gaussian.
 
 use serde::{Deserialize, Serialize};
 use sightline_geometry::estimate::quantile::median;
@@ -13,25 +13,25 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 /// Degrees of freedom of a position.
 const DEGREES_OF_FREEDOM: f64 = 3.0;
 
-/// The verdict on a set of covariances.
+/// Consistency of a set of covariances with its errors.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
-    /// How many errors were compared.
+    /// Number of errors.
     pub count: usize,
-    /// Mean squared Mahalanobis distance; 3 where the covariances are right.
+    /// Mean squared Mahalanobis distance; 3 for correct covariances.
     pub mean_nees: f64,
-    /// Its median; 2.37 where the covariances are right.
+    /// Median squared Mahalanobis distance; 2.37 for correct covariances.
     pub median_nees: f64,
-    /// The 95 % band of the mean if all runs were independent.
+    /// 95 % band of the mean if all runs are independent.
     pub band: [f64; 2],
-    /// The 95 % band of the mean if only the worlds were independent.
+    /// 95 % band of the mean if only the worlds are independent.
     pub band_of_worlds: [f64; 2],
-    /// Share with a Mahalanobis distance of at most 3.
+    /// Fraction with a Mahalanobis distance of at most 3.
     pub inside_3_sigma: f64,
 }
 
 impl Calibration {
-    /// Compares squared Mahalanobis distances of runs in `worlds` worlds; none without any.
+    /// Evaluates squared Mahalanobis distances of runs in `worlds` worlds; `None` without any.
     pub fn of(nees: &[f64], worlds: usize) -> Option<Self> {
         let count = nees.len();
         if count == 0 || worlds == 0 {
@@ -58,7 +58,7 @@ pub fn band(runs: usize) -> Option<[f64; 2]> {
 mod tests {
     use super::*;
 
-    /// Whether the mean lies in the narrower band.
+    /// Returns whether the mean is inside the band for independent runs.
     fn is_calibrated(found: &Calibration) -> bool {
         (found.band[0]..=found.band[1]).contains(&found.mean_nees)
     }

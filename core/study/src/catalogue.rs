@@ -1,21 +1,22 @@
-//! The studies by name: the paper's experiments with their grids, default configurations and printed results.
+//! The studies by name: the papers' experiments with their grids, default configurations and printed results.
 //!
 //! | study | source | scenario | variable |
 //! |---|---|---|---|
 //! | `straight` | K§5.1, R108–R117 | approach-5 | `n_skip`: steps of 5 to 22.6 % |
 //! | `sideways` | K§5.2, R118–R122, E19 | sideways-70 | `azimuth_step_deg` × `search_window_px` |
 //! | `turn-in-place` | K§5.3, R123 | turn-in-place | `turn_step_deg` |
-//! | `claim` | abstract, R127 | claim (`randomised`) | none: the seed draws drive and light as well |
+//! | `claim` | abstract, R127 | claim (`randomised`) | none: the seed also draws drive and light |
 //! | `approach` | K§4.2, R41, R46 | approach-10 | none |
 //! | `terrain` | K§5.5, R124–R126 | slope-…, stuck | `terrain` × `odometry` |
-//! | `checkout-1`, `-2`, `-3` | K§7.1–7.3, R130–R143 | checkout-… | `position`: one row a step |
+//! | `checkout-1`, `-2`, `-3` | K§7.1–7.3, R130–R143 | checkout-… | `position`: one row per step |
 //! | `faults` | K§4.6, R88, R126 | several | `fault` |
 //! | `recovery` | D§4, R155, R214 | k9-5 | `start_error_cm` |
 //! | `k9` | D§4, R209–R215 | k9-5, k9-7.5, k9-10 | `scenario` |
 //! | `feature-covariance` | D§2, R172–R177 | approach-10 | none |
 //! | `feature-faults` | D§1, D§4, R156, R185, R208 | several | `fault` |
 //!
-//! The sideways study skips images; 70° is no multiple of 15°, 20° and more, whose last full step ends earlier (E19).
+//! The sideways study skips images; 70° is no multiple of 15°, 20° and larger steps, so the last full step ends earlier
+//! (E19).
 
 use serde_json::Value;
 
@@ -24,48 +25,48 @@ use sightline_geometry::error::{Error, Result};
 use sightline_rover::visual_odometry::OdometryMode;
 use sightline_track::presets::PRESETS;
 
-/// What the grid of a study may hold.
+/// Values accepted by a study's grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Grid {
-    /// Images skipped.
+    /// Number of skipped images.
     Skips,
-    /// Multiples of 5° up to so many.
+    /// Multiples of 5° up to this angle, degrees.
     Angles(u32),
-    /// The study's own words.
+    /// Words defined by the study.
     Words(&'static [&'static str]),
     /// A single point.
     One,
 }
 
-/// An experiment that can be run.
+/// A study of the catalogue.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Study {
-    /// Its name.
+    /// Name on the command line.
     pub name: &'static str,
-    /// What it asks, as one sentence.
+    /// Question of the study, as one sentence.
     pub question: &'static str,
-    /// Its first variable.
+    /// Name of the first variable.
     pub variable: &'static str,
-    /// The variable's unit, empty for words and pure numbers.
+    /// Unit of the variable, empty for words and pure numbers.
     pub unit: &'static str,
-    /// Which configurations run by default; empty for all presets.
+    /// Default configurations; empty for all presets.
     configurations: &'static [&'static str],
-    /// What its grid may hold.
+    /// Values accepted by the grid.
     grid: Grid,
-    /// The grid by default.
+    /// Default grid.
     default_grid: &'static [&'static str],
-    /// Whether every step becomes a row.
+    /// Whether every step is a row of the table.
     pub is_by_step: bool,
 }
 
-/// The search windows of the sideways study, px (R120: 200 and 600; a window here has an odd side).
+/// Search windows of the sideways study, px (R120: 200 and 600; windows here have odd sides).
 pub(crate) const SIDEWAYS_WINDOWS_PX: [u32; 2] = [201, 601];
 
-/// What visual odometry is used for in the terrain study.
+/// Uses of visual odometry in the terrain study.
 const ODOMETRY: [(&str, OdometryMode); 3] =
     [("off", OdometryMode::Off), ("slip-check", OdometryMode::SlipCheck), ("full", OdometryMode::Full)];
 
-/// The step at which a jump happens.
+/// Step at which a jump happens.
 const JUMP_STEP: usize = 3;
 
 const TERRAINS: &[&str] = &["slope-flat", "slope-shallow", "slope-steep", "slope-oblique", "stuck"];
@@ -84,10 +85,10 @@ const FAULTS: &[&str] = &[
 
 const K9: &[&str] = &["k9-5", "k9-7.5", "k9-10"];
 
-/// How far off the target is taken to be when the shape is asked, cm (R155, R214).
+/// Errors of the target at the start of the shape registration, cm (R155, R214).
 const START_ERRORS_CM: &[&str] = &["0", "5", "10", "15", "20", "25", "30", "40"];
 
-/// What happens to features; the last four are no faults of the world but claims of the tracker (R156).
+/// Faults of the feature study; the last four are no faults of the world but test claims of the tracker (R156).
 const FEATURE_FAULTS: &[&str] = &[
     "occlusion",
     "cloud",
@@ -114,7 +115,7 @@ const fn study(name: &'static str, question: &'static str, configurations: &'sta
     }
 }
 
-/// Every study, in the order in which they are listed.
+/// All studies, in the order in which they are listed.
 pub const STUDIES: &[Study] = &[
     Study {
         variable: "n_skip",
@@ -237,10 +238,10 @@ pub const STUDIES: &[Study] = &[
 ];
 
 impl Study {
-    /// The study of that name.
+    /// Finds a study by name.
     ///
     /// # Errors
-    /// A name that is not listed; the sentence lists those that are.
+    /// An unknown name; the message lists the known ones.
     pub fn named(name: &str) -> Result<&'static Self> {
         STUDIES.iter().find(|study| study.name == name).ok_or_else(|| {
             let known = STUDIES.iter().map(|study| study.name).collect::<Vec<_>>().join(", ");
@@ -248,7 +249,7 @@ impl Study {
         })
     }
 
-    /// The configurations that run by default.
+    /// Default configurations; all presets if the study has none of its own.
     pub fn default_configurations(&self) -> Vec<&'static str> {
         if self.configurations.is_empty() {
             PRESETS.iter().map(|preset| preset.name).collect()
@@ -257,15 +258,15 @@ impl Study {
         }
     }
 
-    /// The grid by default.
+    /// Default grid.
     pub fn default_grid(&self) -> &'static [&'static str] {
         self.default_grid
     }
 
-    /// The points of the grid: the study's own, or those that were asked for.
+    /// Points of the grid: the study's own, or the requested ones.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a value that the grid of this study cannot hold.
+    /// [`Error::Setting`] for a value that the grid of this study does not accept.
     pub fn points(&self, grid: &[String]) -> Result<Vec<Point>> {
         let refused = |value: &str, why: String| Error::setting("grid", format!("{value}: {why}"));
         if self.grid == Grid::One {
@@ -280,7 +281,7 @@ impl Study {
         Ok(points.collect::<Result<Vec<_>>>()?.concat())
     }
 
-    /// The only point of a study without a grid.
+    /// The single point of a study without a grid.
     fn single(&self) -> Point {
         let scenario = match self.name {
             "approach" | "feature-covariance" => "approach-10",
@@ -370,7 +371,7 @@ impl Study {
     }
 }
 
-/// A point of the sideways study with each of its windows.
+/// A point of the sideways study with each of the search windows.
 fn with_windows(point: &Point) -> Vec<Point> {
     let with = |window_px: u32| {
         let mut point = point.clone();

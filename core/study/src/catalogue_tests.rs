@@ -1,4 +1,4 @@
-//! What the catalogue promises: points in scenarios that exist, configurations that are known, grids that refuse.
+//! Consistency of the catalogue: points in existing scenarios, known configurations, grids that refuse other values.
 
 use super::*;
 use crate::plan::Configuration;

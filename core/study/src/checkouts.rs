@@ -1,15 +1,15 @@
-//! Kim et al.'s four checkouts on Mars (K§7) as drives on commands, beside what the paper prints.
+//! Kim et al.'s four checkouts on Mars (K§7) as commanded drives, compared with the paper.
 //!
-//! | checkout | phases | beside it |
+//! | checkout | phases | compared with |
 //! |---|---|---|
-//! | 1 | the motions of the scenario, not towards the target | Table III; the centre of the turn that explains its rows 7 and 8 best |
-//! | 2 | to within 2 m of the target, pose by wheels and IMU | 15 updates, magnification, 19 minutes: too few for updates of the navigator |
+//! | 1 | the motions of the scenario, not towards the target | Table III; the turn centre that fits its rows 7 and 8 best |
+//! | 2 | to within 2 m, pose by wheels and IMU | 15 updates, magnification, 19 minutes: too few for navigator updates |
 //! | 3 | turn, back up, return with visual odometry, return with hazard avoidance | Table IV |
-//! | 4 | to the target, hand-off to the hazcams, the point that the arm touches | 8 mm |
+//! | 4 | to the target, hand-off to the hazcams, the contact point of the arm | 8 mm |
 //!
 //! ```text
 //! turn about c:   C₇ = c + R(θ)(C₆ − c)      straight:   C₈ = C₇ + R(θ) (1 m, 0)
-//! magnification   D_before / D_after         azimuth     direction of target − C, less that before
+//! magnification   D_before / D_after         azimuth     change of the direction target − C
 //! residual²       mean over both rows of ((Δmagnification)/0.04)² and ((Δazimuth)/1°)²
 //! ```
 //! | symbol | meaning | unit, frame |
@@ -42,10 +42,10 @@ use sightline_world::{Scenario, choose_targets, library};
 use super::paper::TABLE_III;
 use super::step_record::StepRecord;
 
-/// The images of the drives, and their world.
+/// World and image settings of the drives.
 #[derive(Clone, Copy, Debug)]
 pub struct Images {
-    /// The world's seed.
+    /// Seed of the world.
     pub seed: u64,
     /// Side of the images, px.
     pub size: u32,
@@ -56,68 +56,68 @@ pub struct Images {
 /// A step of a checkout.
 #[derive(Clone, Debug, Serialize)]
 pub struct CheckoutStep {
-    /// What the rover does.
+    /// Action of the rover in this phase.
     pub phase: &'static str,
-    /// What the update looked like.
+    /// Record of the update.
     #[serde(flatten)]
     pub record: StepRecord,
-    /// What Table III prints of it: magnification, roll (deg), change of azimuth (deg), score; null elsewhere.
+    /// Row of Table III: magnification, roll (deg), change of azimuth (deg), score; null for other steps.
     pub paper: Option<[f64; 4]>,
 }
 
-/// A phase of a checkout, beside its line of Table IV.
+/// A phase of a checkout, with its line of Table IV.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct CheckoutPhase {
-    /// What the rover does.
+    /// Action of the rover.
     pub phase: &'static str,
-    /// Updates of the target, of visual odometry and of the navigator.
+    /// Number of updates of the target, of visual odometry and of the navigator.
     pub updates: [usize; 3],
     /// Time on Mars, min.
     pub minutes: f64,
-    /// The updates and the time that the paper prints; null where it prints none.
+    /// Printed updates and time (min); null if the paper has none.
     pub paper: Option<([usize; 3], f64)>,
 }
 
-/// The centre of a turn in place.
+/// Centre of a turn in place.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct TurnCentre {
     /// Ahead and to the right of the rover's origin, m.
     pub centre_m: [f64; 2],
-    /// What a turn about it changes in rows 7 and 8: magnification and azimuth (deg) of each.
+    /// Magnification and change of azimuth (deg) in rows 7 and 8 for a turn about this centre.
     pub rows: [[f64; 2]; 2],
     /// RMS over those four, in units of 4 % and 1°.
     pub residual: f64,
 }
 
-/// A checkout that was driven.
+/// Result of a checkout.
 #[derive(Clone, Debug, Serialize)]
 pub struct Checkout {
-    /// Its number, 1 to 4.
+    /// Number of the checkout, 1 to 4.
     pub number: u32,
-    /// Its steps, the designation first.
+    /// Steps, the designation first.
     pub steps: Vec<CheckoutStep>,
-    /// Its phases.
+    /// Phases, in order.
     pub phases: Vec<CheckoutPhase>,
-    /// Its outcome.
+    /// Outcome of the drive.
     pub summary: DriveSummary,
-    /// Change of the target's position in the site since the designation, m.
+    /// Change of the target's position in the site frame since the designation, m.
     pub total_correction_m: f64,
-    /// The centre of checkout 1's turn that explains Table III best; null elsewhere.
+    /// Centre of checkout 1's turn that fits Table III best; null for the others.
     pub turn_centre: Option<TurnCentre>,
-    /// What the arm is told; null without a hand-off.
+    /// Instrument-placement target; null without a hand-off.
     pub placement: Option<Placement>,
 }
 
 /// The turn of checkout 1, rad, and the straight motion after it, m (R131).
 const TURN_RAD: f64 = 20.0 * std::f64::consts::PI / 180.0;
 const STRAIGHT_M: f64 = 1.0;
-/// Checkout 2 ends this near the target, m (R137).
+/// Largest distance from the target at the end of checkout 2, m (R137).
 const WITHIN_M: f64 = 2.0;
-/// Lines of Table IV (R143): updates of target, odometry and navigator, minutes.
+/// Lines of Table IV (R143): updates of target, odometry and navigator; minutes.
 const TABLE_IV: [([usize; 3], f64); 4] =
     [([7, 0, 0], 10.0), ([10, 0, 0], 11.0), ([4, 6, 0], 15.0), ([4, 0, 4], 23.0)];
 
-/// A drive under way, phase by phase.
+/// A drive in progress, phase by phase.
 struct Under<'a> {
     drive: TargetedDrive,
     settings: &'a Settings,
@@ -126,10 +126,10 @@ struct Under<'a> {
     phases: Vec<CheckoutPhase>,
 }
 
-/// Drives a checkout, with the tracker of a preset; that of the hand-off in checkout 4 is `combined`.
+/// Drives a checkout with the tracker of a preset; checkout 4, with its hand-off, uses `combined`.
 ///
 /// # Errors
-/// A number from 1 to 4 is needed; a preset that is not known, a world that cannot be driven in, or [`Error::Cancelled`].
+/// A number outside 1 to 4, an unknown preset, a world that cannot be driven in, or [`Error::Cancelled`].
 pub fn drive(
     number: u32,
     images: Images,
@@ -152,7 +152,7 @@ pub fn drive(
         3 => DriveCommand { motions: motions[..7].to_vec(), ..blind.clone() },
         _ => DriveCommand {
             standoff_m: standoff_m(traverse, scenario.drive.end_distance_m),
-            // The paper drove to within 2 m of the target.
+            // The paper's drive ended within 2 m of the target.
             tolerance_m: if number == 2 {
                 WITHIN_M - scenario.drive.end_distance_m
             } else {
@@ -177,7 +177,7 @@ pub fn drive(
     under.finish(number)
 }
 
-/// The scenario of a checkout, with hazcams at every stop.
+/// Scenario of a checkout, with hazcams at every stop.
 fn scenario(number: u32, images: Images) -> Result<Scenario> {
     if !(1..=4).contains(&number) {
         return Err(Error::setting("checkout", format!("{number} is outside 1 to 4")));
@@ -191,20 +191,20 @@ fn scenario(number: u32, images: Images) -> Result<Scenario> {
         look_deg: None,
         image_size: if number == 4 { images.size.min(1024) } else { 256 },
     });
-    // The planned drive is not driven: the first stop alone is used.
+    // Only the first stop of the planned drive is used.
     scenario.validate()?;
     Ok(scenario)
 }
 
-/// The horizontal standoff of the rover's origin at which the mast's camera is this far from the target, m.
+/// Horizontal standoff of the rover's origin at which the mast's camera is `camera_m` from the target, m.
 fn standoff_m(traverse: &sightline_recordings::Traverse, camera_m: f64) -> f64 {
     let camera = Stops::cameras(traverse, 0).0.model.centre();
-    // The target lies near the ground, the camera that high above it.
+    // The target is near the ground, the camera this high above it.
     let height_m = -camera.z;
     (camera_m * camera_m - height_m * height_m).max(0.0).sqrt() + camera.x
 }
 
-/// The moves of a scenario as motions; those that need the truth are left out.
+/// Converts the moves of a scenario to motions; moves that need the truth are skipped.
 fn motions(moves: &[Move]) -> Vec<Motion> {
     let mut motions = Vec::new();
     for one in moves {
@@ -227,10 +227,10 @@ fn motions(moves: &[Move]) -> Vec<Motion> {
 }
 
 impl Under<'_> {
-    /// The phases of checkout 3, `motions` being those after the turn.
+    /// Drives the phases of checkout 3; `motions` are those after the turn.
     fn third(&mut self, motions: &[Motion], blind: &DriveCommand) -> Result<()> {
         self.phase("turn", Some(TABLE_IV[0]))?;
-        // What follows the backing up is driven to the target.
+        // The motions after backing up are replaced by a drive to the target.
         let back = motions.iter().take_while(|motion| motion.length_and_turn().0 < 0.0).copied().collect();
         self.drive.go_on(DriveCommand { motions: back, ..blind.clone() })?;
         self.phase("back up", Some(TABLE_IV[1]))?;
@@ -239,7 +239,7 @@ impl Under<'_> {
             ("hazard avoidance", 1.4, OdometryMode::Off, NavigatorKind::Gestalt, TABLE_IV[3]),
         ] {
             let distance_m = self.distance_m();
-            // Four steps, each the same part of the distance.
+            // Four steps, each the same fraction of the distance.
             let step_fraction = 1.0 - ((distance_m - length_m) / distance_m).powf(0.25) + 0.002;
             self.drive.go_on(DriveCommand {
                 standoff_m: distance_m - length_m,
@@ -253,13 +253,13 @@ impl Under<'_> {
         Ok(())
     }
 
-    /// Horizontal distance of the target by the last step, m.
+    /// Horizontal distance of the target at the last step, m.
     fn distance_m(&self) -> f64 {
         let target = self.drive.steps.last().map(|last| last.update.target.position_in_rover);
         target.map_or(f64::NAN, |target| target.x.hypot(target.y))
     }
 
-    /// Drives to the end of the present command.
+    /// Drives to the end of the current command.
     fn phase(&mut self, phase: &'static str, paper: Option<([usize; 3], f64)>) -> Result<()> {
         let steps = self.drive.steps.len();
         let minutes: f64 = self.phases.iter().map(|phase| phase.minutes).sum();
@@ -309,7 +309,7 @@ impl Under<'_> {
     }
 }
 
-/// The centre of the turn that explains rows 7 and 8 of Table III best, from where the target truly lies at position 6.
+/// Centre of the turn that fits rows 7 and 8 of Table III best, with the true position of the target at position 6.
 fn turn_centre(drive: &TargetedDrive) -> Option<TurnCentre> {
     let traverse = drive.world.traverse();
     let step = drive.steps.get(5)?;
@@ -321,7 +321,7 @@ fn turn_centre(drive: &TargetedDrive) -> Option<TurnCentre> {
 
 /// The same for a target and a camera, horizontal, rover frame, m.
 fn best_turn_centre(target_m: [f64; 2], camera_m: [f64; 2]) -> TurnCentre {
-    // Every centimetre within 1.5 m of the rover's origin.
+    // All centres on a grid of 1 cm within 1.5 m of the rover's origin in x and y.
     let places = (-150..=150).flat_map(|x| (-150..=150).map(move |y| [x, y].map(|at| 0.01 * f64::from(at))));
     let all = places.map(|centre_m| {
         let rows = rows_of_turn(centre_m, target_m, camera_m);
@@ -335,7 +335,7 @@ fn best_turn_centre(target_m: [f64; 2], camera_m: [f64; 2]) -> TurnCentre {
     all.fold(first, |best, one| if one.residual < best.residual { one } else { best })
 }
 
-/// Magnification and change of azimuth (deg) of a turn about a centre, and of the straight motion after it.
+/// Magnification and change of azimuth (deg) of a turn about a centre, and of the following straight motion.
 fn rows_of_turn(centre_m: [f64; 2], target_m: [f64; 2], camera_m: [f64; 2]) -> [[f64; 2]; 2] {
     let (sine, cosine) = TURN_RAD.sin_cos();
     let [x, y] = [camera_m[0] - centre_m[0], camera_m[1] - centre_m[1]];

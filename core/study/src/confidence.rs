@@ -1,39 +1,39 @@
-//! What a locator's confidence is worth, and how far the motions that it measured were off (R178, R182–R184).
+//! Reliability of a locator's confidence, and errors of the motions that it measured (R178, R182–R184).
 //!
-//! A step is *sure* when the confidence exceeds 0.9, and *surely wrong* when the drift then exceeds 5 cm: the case that
-//! must not happen, because nobody looks for it. The error of a motion is that of the pose `T_true⁻¹ T`: its angle, and how
-//! far it misplaces the target.
+//! A step is *sure* if the confidence exceeds 0.9, and *surely wrong* if the drift then exceeds 5 cm: the case that must
+//! not happen, because it goes unnoticed. The error of a motion is that of the pose `T_true⁻¹ T`: its angle, and the
+//! displacement of the target.
 
 use serde::{Deserialize, Serialize};
 
 use sightline_session::track::Drive;
 use sightline_track::trace::StepTrace;
 
-/// Confidence from which a step counts as sure.
+/// Confidence above which a step counts as sure.
 const SURE: f64 = 0.9;
 
-/// Drift from which it counts as wrong, m.
+/// Drift above which a step counts as wrong, m.
 const WRONG_M: f64 = 0.05;
 
-/// The steps of a run, by confidence and drift.
+/// Statistics of a run's steps by confidence and drift.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Trust {
-    /// Steps with a confidence.
+    /// Number of steps with a confidence.
     pub steps: usize,
-    /// Steps that were sure.
+    /// Number of sure steps.
     pub sure: usize,
-    /// Steps that were sure, and wrong.
+    /// Number of sure steps that were wrong.
     pub surely_wrong: usize,
-    /// The lowest confidence.
+    /// Lowest confidence; `None` without a step.
     pub lowest: Option<f64>,
-    /// How far each measured motion misplaced the target, m.
+    /// Error of each measured motion at the target, m.
     pub motion_errors_m: Vec<f64>,
-    /// How far it was turned wrongly, rad.
+    /// Rotation error of each measured motion, rad.
     pub motion_errors_rad: Vec<f64>,
 }
 
 impl Trust {
-    /// Adds a step after the designation with the drift so far.
+    /// Adds a step after the designation with the drift up to it.
     pub fn add<D: Drive>(&mut self, drive: &D, trace: &StepTrace, drift_m: Option<f64>) {
         let Some(located) = trace.located() else { return };
         let is_sure = located.confidence > SURE;
@@ -48,7 +48,7 @@ impl Trust {
     }
 }
 
-/// How far the motion of a step misplaces the target, m, and turns it, rad; none where no motion was measured.
+/// Error of a step's motion at the target, m, and of its rotation, rad; `None` without a measured motion.
 fn motion_error<D: Drive>(drive: &D, trace: &StepTrace) -> Option<[f64; 2]> {
     let evidence = trace.features()?;
     let (fitted, matched) = (evidence.fit_motion.as_ref()?, evidence.match_features.as_ref()?);

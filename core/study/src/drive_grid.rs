@@ -1,13 +1,13 @@
-//! Drives on commands over a grid of slope, rock coverage, use of visual odometry and navigator.
+//! Commanded drives over a grid of slope, rock coverage, use of visual odometry and navigator.
 //!
-//! Each drive is towards the first target that the scenario's rule chooses, from 10 m, among the rocks of `obstacles-10` without its
-//! placed one, with the slip of firm soil; the seed draws the direction of the slope as well. The columns are those of the summary of
-//! `sightline drive`.
+//! Each drive starts 10 m from the first target chosen by the scenario's rule, among the rocks of `obstacles-10` without
+//! the placed one, with the slip of firm soil; the seed also draws the direction of the slope. The columns are those of
+//! the summary of `sightline drive`.
 //!
-//! Whether a way leads to the goal is found on the true ground by the limits of the navigator, of `gestalt` for `arcs`
-//! (`true_ground.rs`).
+//! Reachability of the goal is determined on the true ground with the limits of the navigator; `arcs` uses those of
+//! `gestalt` (`true_ground.rs`).
 //!
-//! The interval of the share of arrived drives is that of Clopper and Pearson, 95 %. Source: driving.md §2, R98.
+//! The interval of the fraction of arrived drives is that of Clopper and Pearson, 95 %. Source: driving.md §2, R98.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -34,72 +34,72 @@ use sightline_world::{Scenario, choose_targets, library};
 use super::plan::code_key;
 use super::true_ground::way_to_goal_m;
 
-/// A place of the grid.
+/// A cell of the grid.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cell {
     /// Mean slope of the ground, deg.
     pub slope_deg: f64,
-    /// Part of the ground that rocks cover.
+    /// Fraction of the ground covered by rocks.
     pub coverage: f64,
-    /// What visual odometry is used for.
+    /// Use of visual odometry.
     pub odometry: OdometryMode,
     /// The navigator.
     pub navigator: NavigatorKind,
 }
 
-/// One drive.
+/// Row of one drive.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DriveRow {
-    /// Key of the code that drove it.
+    /// Key of the code that ran it.
     pub code: String,
-    /// Its place in the grid.
+    /// Its cell of the grid.
     #[serde(flatten)]
     pub cell: Cell,
-    /// The world's seed.
+    /// Seed of the world.
     pub seed: u64,
     /// Side of the images, px.
     pub size: u32,
     /// Samples along each side of a pixel.
     pub samples_per_axis: u32,
-    /// Why it could not begin; null where it did.
+    /// Reason why it could not start; null if it did.
     pub problem: Option<String>,
-    /// Length of a way over the true ground to the goal, m; null without one.
+    /// Length of a path over the true ground to the goal, m; null without one.
     pub way_m: Option<f64>,
-    /// The outcome; absent where it could not begin.
+    /// Outcome; absent if it could not start.
     #[serde(flatten)]
     pub summary: Option<DriveSummary>,
 }
 
-/// The drives of a cell.
+/// Summary of a cell's drives.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CellSummary {
     /// The cell.
     #[serde(flatten)]
     pub cell: Cell,
-    /// Drives that began.
+    /// Number of drives that started.
     pub drives: usize,
-    /// Those that arrived, and the 95 % interval of their share.
+    /// Number of arrived drives.
     pub arrived: usize,
-    /// See `arrived`.
+    /// 95 % interval of the fraction of arrived drives.
     pub arrived_interval: [f64; 2],
-    /// Drives for which there was a way, and those of them that arrived.
+    /// Number of drives with a path to the goal, and of those that arrived.
     pub with_way: [usize; 2],
     /// Collisions in all drives.
     pub collisions: u32,
-    /// How the others ended, by reason.
+    /// Number of drives that did not arrive, by reason.
     pub reasons: BTreeMap<String, usize>,
-    /// Median and largest error of the target over the drives that arrived, m; null without one.
+    /// Median and largest error of the target over the arrived drives, m; null without one.
     pub target_error_m: Option<[f64; 2]>,
-    /// Median and largest error of the goal over them, m; null without one.
+    /// Median and largest error of the goal over the arrived drives, m; null without one.
     pub goal_error_m: Option<[f64; 2]>,
 }
 
-/// The drives of a study.
+/// Grid of a study.
 #[derive(Clone, Debug)]
 pub struct DriveGrid {
     /// The cells.
     pub cells: Vec<Cell>,
-    /// The seeds of the worlds of each cell.
+    /// Seeds of the worlds, used in every cell.
     pub seeds: Vec<u64>,
     /// Side of the images, px.
     pub size: u32,
@@ -111,7 +111,7 @@ impl DriveGrid {
     /// The scenario of a drive.
     ///
     /// # Errors
-    /// A cell of which no world can be made.
+    /// A cell for which no world can be generated.
     pub fn scenario(&self, cell: &Cell, seed: u64) -> Result<Scenario> {
         let mut random = Pcg64::seed_from_u64(seed ^ 0x9a1d_d21e);
         let mut scenario = Scenario { seed, ..library::scenario("obstacles-10")? };
@@ -121,16 +121,16 @@ impl DriveGrid {
         scenario.rocks.placed.clear();
         scenario.camera.image_size = self.size;
         scenario.camera.samples_per_axis = self.samples_per_axis;
-        // The rule's window of 21 px is one for images of 1024 px.
+        // The rule's window of 21 px is for images of 1024 px.
         scenario.targets.window_px = (scenario.targets.window_px * self.size / 1024).max(9) | 1;
         scenario.validate()?;
         Ok(scenario)
     }
 
-    /// Drives everything that is not among the `known` rows; `tell` is given each row as soon as it is there.
+    /// Runs all drives that are not among the `known` rows; `tell` is called with each new row.
     ///
     /// # Errors
-    /// [`Error::Cancelled`], a cell of which no world can be made, or what `tell` returns.
+    /// [`Error::Cancelled`], a cell for which no world can be generated, or an error of `tell`.
     pub fn run(
         &self,
         known: &[DriveRow],
@@ -158,7 +158,7 @@ impl DriveGrid {
             let place = folder.join(format!("{:?}-{:?}-{seed}", cell.odometry, cell.navigator));
             let place = place.join(format!("{}-{}", cell.slope_deg, cell.coverage));
             let driven = self.drive(cell, *seed, &place, cancel);
-            // The images of a hundred drives would fill a disk.
+            // Images are removed: those of a hundred drives would fill the disk.
             let _ = std::fs::remove_dir_all(&place);
             let row = match driven {
                 Ok((way_m, summary)) => DriveRow { way_m, summary: Some(summary), ..empty },
@@ -171,7 +171,7 @@ impl DriveGrid {
         all.par_iter().map(one).collect()
     }
 
-    /// The length of a way over the true ground, and the outcome.
+    /// Length of a path over the true ground, and outcome.
     fn drive(
         &self,
         cell: &Cell,
@@ -198,7 +198,7 @@ impl DriveGrid {
         Ok((way_m, drive.summary()))
     }
 
-    /// The outcome of every cell.
+    /// Summaries of all cells.
     pub fn summaries(&self, rows: &[DriveRow]) -> Vec<CellSummary> {
         let of_cell = |cell: &Cell| {
             let own = |row: &&DriveRow| row.cell == *cell;
@@ -211,14 +211,14 @@ impl DriveGrid {
 }
 
 impl DriveRow {
-    /// Whether it is the drive that another row is of.
+    /// Returns whether both rows are of the same drive.
     fn is_of(&self, other: &Self) -> bool {
         let key = |row: &Self| (row.code.clone(), row.cell, row.seed, row.size, row.samples_per_axis);
         key(self) == key(other)
     }
 }
 
-/// The outcome of a cell; of each drive, whether there was a way.
+/// Summary of a cell; the flag of each drive is whether it had a path.
 fn summary(cell: Cell, drives: &[(bool, DriveSummary)]) -> CellSummary {
     let made: Vec<DriveSummary> = drives.iter().map(|(_, summary)| *summary).collect();
     let with_way = || drives.iter().filter(|(has_way, _)| *has_way);
@@ -245,7 +245,7 @@ fn summary(cell: Cell, drives: &[(bool, DriveSummary)]) -> CellSummary {
     }
 }
 
-/// The 95 % interval of a share by Clopper and Pearson.
+/// 95 % interval of a fraction, by Clopper and Pearson.
 fn interval(count: usize, of: usize) -> [f64; 2] {
     let (k, n) = (count as f64, of as f64);
     let quantile =
@@ -319,7 +319,7 @@ mod tests {
         assert_eq!(found.with_way, [4, 3]);
         assert_eq!(found.target_error_m, Some([0.002, 0.003]));
         assert_eq!(found.reasons, BTreeMap::from([(StopReason::Stalled.word().to_owned(), 1)]));
-        // A row is read back as it was written, with an outcome and without one.
+        // A row survives serialisation, with and without an outcome.
         for row in &rows {
             let text = serde_json::to_string(row).unwrap();
             assert_eq!(serde_json::from_str::<DriveRow>(&text).unwrap(), *row, "{text}");

@@ -1,9 +1,9 @@
-//! Whether a row of targets is still smooth and even at the last stop (R115).
+//! Smoothness of a row of targets at the last stop (R115).
 //!
-//! Targets of one row lie on a straight line of the first image at equal spacing. After the approach their pixels, as
-//! functions of their place t in the row, again form a smooth curve where nothing drifted. The residual of a cubic fit
-//! through x(t) and y(t), as a root mean square over the row, says how uneven they are, px. The rock's own relief bends
-//! the row too: the residual of the true pixels stands beside it.
+//! Targets of one row are designated on a straight line of the first image at equal spacing. After the approach their
+//! pixels, as functions of their position t in the row, are a smooth curve unless targets drifted. The RMS residual of a
+//! cubic fit to x(t) and y(t) measures the unevenness, px. The rock's relief also bends the row: the residual of the
+//! true pixels is the baseline.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -13,14 +13,14 @@ use sightline_geometry::frames::Pixel;
 /// Coefficients of a cubic.
 const COEFFICIENTS: usize = 4;
 
-/// Root mean square residual of a cubic fit to places `t` with pixels, px; none where nothing is left over.
+/// RMS residual of a cubic fit to pixels at positions `t`, px; `None` without redundancy.
 pub(crate) fn residual_px(row: &[(f64, Pixel)]) -> Option<f64> {
     if row.len() <= COEFFICIENTS + 1 {
         return None;
     }
     let (low, high) =
         row.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &(t, _)| (l.min(t), h.max(t)));
-    // Places between −1 and 1 keep the powers apart.
+    // Positions scaled to −1 … 1 keep the powers well conditioned.
     let place = |t: f64| (2.0 * t - low - high) / (high - low);
     let powers = DMatrix::from_fn(row.len(), COEFFICIENTS, |i, k| place(row[i].0).powi(k as i32));
     let solver = powers.clone().svd(true, true);
@@ -32,7 +32,7 @@ pub(crate) fn residual_px(row: &[(f64, Pixel)]) -> Option<f64> {
     Some((sum_px2 / (row.len() - COEFFICIENTS) as f64).sqrt())
 }
 
-/// Mean unevenness over the rows of some runs, px: of the located pixels and of the true ones, over tracked targets.
+/// Mean unevenness over the rows of some runs, px: of the located and of the true pixels of tracked targets.
 pub(crate) fn of_rows(runs: &[&Run]) -> Option<[f64; 2]> {
     let mut groups: Vec<&str> =
         runs.iter().map(|run| run.group.as_str()).filter(|group| group.starts_with("row")).collect();

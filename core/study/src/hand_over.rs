@@ -1,13 +1,13 @@
-//! What the shape tracker's part of a run was worth (R213, R215).
+//! Errors of the shape tracker in a run (R213, R215).
 //!
 //! ```text
-//! drift          │ x_features − T_true x_0 │            what following the features added, at the last stop of the mast's pair
-//! tracker        │ x_features − x_true │                 the whole error there, the designation's own range error included
+//! drift          │ x_features − T_true x_0 │            added by feature tracking, at the last stop of the mast's pair
+//! tracker        │ x_features − x_true │                 total error there, with the designation's range error
 //! first view     │ x_registered − x_true │               the same after the registration to the first view
-//! hand-off       │ x_handed − T_true x_before │          what the transfer to the other pair added
+//! hand-off       │ x_handed − T_true x_before │          added by the transfer to the other pair
 //! ```
-//! All in the rover frame of their stop, m. *Tracker accuracy* and *hand-off accuracy* are the paper's words; it measured
-//! them against the 3-D models of the pair in use, here the simulator's truth stands for those.
+//! All in the rover frame of their stop, m. *Tracker accuracy* and *hand-off accuracy* are the paper's terms; it
+//! measured them against the 3-D models of the current pair, replaced here by the simulator's truth.
 //!
 //! Source: D§4, R209–R215.
 
@@ -17,40 +17,40 @@ use sightline_geometry::frames::Point3;
 use sightline_session::step::RunStep;
 use sightline_world::target_truth::TruthSource;
 
-/// The errors of one run, m; null where a step was not reached.
+/// Errors of one run, m; null if a step was not reached.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct HandOver {
-    /// What following the features added.
+    /// Error added by feature tracking.
     pub drift_m: Option<f64>,
-    /// The whole error by features.
+    /// Total error of feature tracking.
     pub tracker_m: Option<f64>,
-    /// At the registration to the first view.
+    /// Registration to the first view.
     pub first_view: Option<Transfer>,
-    /// At the hand-off.
+    /// Registration at the hand-off.
     pub hand_off: Option<Transfer>,
 }
 
-/// One registration against the truth.
+/// One registration compared with the truth.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Transfer {
-    /// How far off it started, m.
+    /// Error of the start, m.
     pub start_error_m: f64,
-    /// How far off it ended, m; null where it was not used.
+    /// Error of the result, m; null if it was rejected.
     pub error_m: Option<f64>,
-    /// Squared Mahalanobis distance of that error.
+    /// Squared Mahalanobis distance of the total error; null if the result was rejected.
     pub nees: Option<f64>,
-    /// Largest 1σ axis of the target afterwards, m.
+    /// Largest 1σ axis of the target afterwards, m; null if the result was rejected.
     pub sigma_m: Option<f64>,
-    /// 1σ by the registration alone along the axes of its ellipsoid, m, largest first: how observable the rock was.
+    /// 1σ of the registration alone along the axes of its ellipsoid, m, largest first: the observability of the rock.
     pub sigmas_m: Option<[f64; 3]>,
-    /// Half the width of the recognised surface, m.
+    /// Half the width of the registered surface, m.
     pub half_width_m: f64,
-    /// Why it was not used.
+    /// Reason of the rejection.
     pub failure: Option<String>,
 }
 
 impl HandOver {
-    /// Adds what a step after the designation tells; `before` is the step before it, `first` the designation.
+    /// Adds a step after the designation: `first` is the designation, `before` the step before `trace`.
     pub fn add<T: TruthSource + ?Sized>(
         &mut self,
         source: &T,
@@ -68,7 +68,7 @@ impl HandOver {
         let accepted = trace.verdict().is_some_and(|verdict| verdict.accepted);
         let is_used = accepted && registration.failure.is_none();
         let error = trace.update.target.position_in_rover - expected;
-        // The hand-off starts from an error of its own, which its covariance holds as well.
+        // The hand-off starts with an error of its own, which its covariance includes: NEES uses the total error.
         let whole = trace.update.target.position_in_rover - truth;
         let transfer = Transfer {
             start_error_m: (Point3::from(registration.start_in_rover) - truth).norm(),

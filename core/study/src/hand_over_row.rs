@@ -1,7 +1,7 @@
-//! The columns of the hand-over in a study's table (R210–R215).
+//! Columns of the hand-off in a study's table (R210–R215).
 //!
-//! `drift_m`, `tracker_error_m`, `first_view_error_m` and `hand_off_error_m` are medians over the row's targets, of which
-//! the K9 rover's drives have one each. Errors of registrations that were not used are not among them: those are counted.
+//! `drift_m`, `tracker_error_m`, `first_view_error_m` and `hand_off_error_m` are medians over the row's targets (one in
+//! each of the K9 rover's drives). They exclude rejected registrations, which are counted instead.
 
 use std::collections::BTreeMap;
 
@@ -12,13 +12,13 @@ use super::run::Run;
 use super::spread::spread;
 use sightline_geometry::estimate::quantile::median;
 
-/// What is farther off is wrong, m.
+/// Error above which a result counts as wrong, m.
 const WRONG_M: f64 = 0.05;
 
-/// One of the registrations of a hand-over.
+/// Selects one of the two registrations of a run.
 type TransferOf = fn(&HandOver) -> Option<&Transfer>;
 
-/// What the hand-overs of some runs were worth; empty where none was tried.
+/// Columns of the hand-offs of some runs; empty if none was tried.
 pub(super) fn columns(runs: &[&Run]) -> BTreeMap<String, Value> {
     let mut columns = BTreeMap::new();
     let of = |value: &dyn Fn(&HandOver) -> Option<f64>| -> Vec<f64> {

@@ -1,12 +1,12 @@
-//! The hand-overs of a study as a table of the paper's form (D-Tab 1 and 3, R210–R213): a line for each configuration and
-//! point of the grid, over all its worlds.
+//! The hand-offs of a study as a table in the paper's form (D-Tab 1 and 3, R210–R213): a line per configuration and
+//! point of the grid, over all worlds.
 //!
-//! Centimetres, because the paper's are; median and 95th percentile over the rows.
+//! In centimetres, as in the paper; median and 95th percentile over the rows.
 
 use super::row::Row;
 use sightline_geometry::estimate::quantile::quantile;
 
-/// The columns: title, column of the rows, and that of the registrations that were tried and failed.
+/// Columns: title, column of the rows, and prefix of the counts of tried and failed registrations.
 const COLUMNS: [(&str, &str, Option<&str>); 4] = [
     ("drift", "drift_m", None),
     ("tracker", "tracker_error_m", None),
@@ -14,7 +14,7 @@ const COLUMNS: [(&str, &str, Option<&str>); 4] = [
     ("hand-off", "hand_off_error_m", Some("hand_off")),
 ];
 
-/// The lines of the table, the first one its head; empty where nothing was handed over. `variable` is the study's.
+/// The lines of the table, the first one its head; empty without hand-offs. `variable` is the study's variable.
 pub fn lines(rows: &[Row], variable: &str) -> Vec<String> {
     let mut groups: Vec<(String, String)> = Vec::new();
     let label = |row: &Row| {
@@ -40,7 +40,7 @@ pub fn lines(rows: &[Row], variable: &str) -> Vec<String> {
     std::iter::once(head).chain(groups.iter().map(line)).collect()
 }
 
-/// Median and 95 %, and how many of those that were tried were used.
+/// Median and 95th percentile, and the numbers of used and of tried registrations.
 fn cell(rows: &[&Row], column: &str, tried: Option<&str>) -> String {
     let values: Vec<f64> = rows.iter().filter_map(|row| row.number(column)).collect();
     let of = |share: f64| {

@@ -1,12 +1,13 @@
-//! K9's three targets in one drive on commands: visited in turn with hazard avoidance, each handed over to the hazcams.
+//! K9's three targets in one commanded drive: visited in turn with hazard avoidance, each handed off to the hazcams.
 //!
 //! ```text
 //! designation  │ x_0 − x_true │           at the first stop, by stereo
-//! tracker      │ x_arrived − x_true │     by features, at the stop at which the rover arrives
+//! tracker      │ x_arrived − x_true │     by features, at the stop of arrival
 //! first view   │ x_look − x_true │        after the registration of the next pair to the view of the designation
-//! hand-off     │ x_handed − x_look │      what the transfer to the hazcams added: the rover stands still
+//! hand-off     │ x_handed − x_look │      added by the transfer to the hazcams: the rover does not move
 //! ```
-//! All in the rover frame, m. *Tracker accuracy* and *hand-off accuracy* are the paper's words (R213), measured against the truth.
+//! All in the rover frame, m. *Tracker accuracy* and *hand-off accuracy* are the paper's terms (R213), measured against
+//! the truth.
 //!
 //! Source: D§4, R205–R215.
 
@@ -26,46 +27,46 @@ use sightline_world::{Scenario, choose_targets, library};
 
 use super::checkouts::Images;
 
-/// The scenarios: a day with the sun aside, and one with the rover's own shadow (R214).
+/// The scenarios: a day with the sun to the side, and one with the rover's own shadow (R214).
 pub const DAYS: [&str; 2] = ["k9-day", "k9-day-shadow"];
 
 /// The part of the drive to one target.
 #[derive(Clone, Debug, Serialize)]
 pub struct K9Visit {
-    /// The scenario.
+    /// Name of the scenario.
     pub day: &'static str,
-    /// The world's seed.
+    /// Seed of the world.
     pub seed: u64,
-    /// The target, 0 to 2.
+    /// Index of the target, 0 to 2.
     pub target: usize,
-    /// How it ended.
+    /// Reason of its end.
     pub reason: String,
-    /// Stops of this part.
+    /// Number of stops of this part.
     pub stops: usize,
-    /// Stops of this part at which the update was bad or the target lost.
+    /// Number of stops of this part at which the update was rejected.
     pub bad_stops: usize,
-    /// Error of the designation, which an incremental tracker keeps, m (R215).
+    /// Error of the designation, which an incremental tracker retains, m (R215).
     pub designation_m: Option<f64>,
-    /// Error at the stop at which it arrived, or else at the last, m.
+    /// Error at the stop of arrival, or else at the last stop, m.
     pub tracker_m: Option<f64>,
-    /// Error of the registration to the first view, m; null if it did not arrive.
+    /// Error of the registration to the first view, m; null if the rover did not arrive.
     pub first_view_m: Option<f64>,
-    /// What the hand-off added, m; null where there was none.
+    /// Error added by the hand-off, m; null without one.
     pub hand_off_m: Option<f64>,
     /// Error after the hand-off, m.
     pub handed_m: Option<f64>,
-    /// Why the hand-off was not used; null where it was.
+    /// Reason why the hand-off was rejected; null if it was used.
     pub failure: Option<String>,
-    /// Distance of the point that the arm would touch from the target, m.
+    /// Distance between the contact point of the arm and the target, m.
     pub touch_m: Option<f64>,
-    /// Time on Mars up to its end, min.
+    /// Time on Mars at its end, min.
     pub minutes: f64,
 }
 
-/// Drives a day and returns its three visits, those that were not reached left out.
+/// Drives a day and returns its visits; targets that were not reached are omitted.
 ///
 /// # Errors
-/// A world that does not show all three targets, or cannot be driven in, or [`Error::Cancelled`].
+/// A world that does not show all three targets or cannot be driven in, or [`Error::Cancelled`].
 pub fn drive(day: &'static str, images: Images, folder: &Path, cancel: Cancel<'_>) -> Result<Vec<K9Visit>> {
     let mut scenario = Scenario { seed: images.seed, ..library::scenario(day)? };
     scenario.camera.image_size = images.size;
@@ -83,7 +84,7 @@ pub fn drive(day: &'static str, images: Images, folder: &Path, cancel: Cancel<'_
     let command = DriveCommand {
         navigator: NavigatorKind::Morphin,
         on_arrival: vec![ArrivalAction::Look, ArrivalAction::HandOff],
-        // The times of a Mars rover are not those of K9.
+        // The time limit of a Mars rover does not apply to K9.
         flight_minutes_max: 10_000.0,
         ..DriveCommand::default()
     };

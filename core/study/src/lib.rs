@@ -2,14 +2,14 @@
 //!
 //! ```text
 //! catalogue   the studies by name        point       one point of a grid
-//! plan        what is to be done, keys   staged      a drive as a study stages it
-//! picks       which pixels, and faults   run         one target tracked and judged     step_record   one step of it
+//! plan        studies to run, keys        staged      a drive with the stops and jumps of a study
+//! picks       target pixels, and faults   run         one target tracked and judged     step_record   one step of it
 //! row         the table's rows           evenness    rows of targets                   calibration   NEES
-//! by_pose     why targets are lost, odometry   terrain_table   Table II
-//! wire        what page and server say to each other about studies
-//! randomised  approaches that the seed draws
-//! odometry    visual odometry in drives  drive_grid  drives on commands over slope, rocks, odometry, navigator
-//! true_ground  whether a way leads over the true ground   checkouts, k9_day   the papers' drives on commands
+//! by_pose     causes of losses, odometry  terrain_table   Table II
+//! wire        messages about studies between page and server
+//! randomised  approaches drawn from the seed
+//! odometry    visual odometry in drives  drive_grid  commanded drives over slope, rocks, odometry, navigator
+//! true_ground  reachability of the goal over the true ground   checkouts, k9_day   the papers' commanded drives
 //! ```
 
 pub mod calibration;

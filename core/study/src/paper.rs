@@ -1,28 +1,28 @@
-//! What the papers print for the studies of the catalogue, beside which ours stand.
+//! Printed values of the papers for the studies of the catalogue.
 //!
-//! Printed values are shares of targets tracked unless the column says otherwise.
+//! Values are fractions of targets tracked unless the column says otherwise.
 
 use serde::Serialize;
 
 use super::catalogue::Study;
 
-/// A value that the paper prints.
+/// A printed value of the paper.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PaperValue {
-    /// The configuration of ours that is the paper's.
+    /// Our configuration that corresponds to the paper's.
     pub configuration: &'static str,
-    /// The value of the study's first variable.
+    /// Value of the study's first variable.
     pub at: f64,
-    /// The value.
+    /// Printed value, in the unit of `column`.
     pub value: f64,
-    /// The column of ours that it stands beside.
+    /// Our column to compare it with.
     pub column: &'static str,
-    /// Where it is printed.
+    /// Section or table of the paper.
     pub source: &'static str,
 }
 
 impl Study {
-    /// What the paper prints.
+    /// Printed values of this study; empty if there are none.
     pub fn paper(&self) -> Vec<PaperValue> {
         let share = |configuration, at, value, source| PaperValue {
             configuration,
@@ -55,15 +55,15 @@ impl Study {
 /// A line of Table II: tracking with visual odometry on terrains (K§5.5, R125).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct PaperTerrain {
-    /// The scenario of ours.
+    /// Our scenario.
     pub terrain: &'static str,
-    /// The paper's word for it.
+    /// Terrain as named in the paper.
     pub word: &'static str,
-    /// Trials.
+    /// Number of trials.
     pub trials: u32,
-    /// Failures.
+    /// Number of failures.
     pub failures: u32,
-    /// Their cause, as printed in short.
+    /// Cause of the failures as printed, abridged.
     pub cause: &'static str,
 }
 
@@ -101,7 +101,7 @@ pub(crate) const TABLE_III: [(&str, [f64; 7]); 4] = [
     ("ncc", [0.88, 0.88, 0.85, 0.87, 0.87, 0.94, 0.79]),
 ];
 
-/// Its rows beside ours.
+/// Table III as printed values.
 fn checkout_1() -> Vec<PaperValue> {
     let rows = TABLE_III.into_iter().flat_map(|(column, values)| {
         (2_u32..).zip(values).map(move |(position, value)| PaperValue {

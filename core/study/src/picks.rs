@@ -1,10 +1,10 @@
-//! Which pixels of a world are tracked at a point of the grid, what they belong to, and when something happens to them.
+//! Target pixels of a world at a point of the grid, their groups, and the steps at which a fault affects them.
 //!
-//! The step of a fault is found in the truth, target by target: the first visited step at which the point is hidden, in
-//! shadow, or out of the left image. A target to which nothing happens is no case and has none.
+//! The step of a fault is determined from the truth, target by target: the first visited step at which the point is
+//! hidden, in shadow, or outside the left image. A target that the fault does not affect has no step and is no case.
 //!
-//! On a face that is circled, two kinds of targets stand apart from the others: one chosen on an occluding boundary
-//! (R119), and those before which another rock passes on the way, which then have such a boundary too.
+//! On a face that is circled, two groups are separated from the other targets: those on an occluding boundary (R119),
+//! and those in front of which another rock passes during the drive, which then have such a boundary too.
 
 use super::point::{Fault, Picks, Point};
 use super::row::{BOUNDARY, PASSED};
@@ -16,13 +16,13 @@ use sightline_world::scenario::Arrangement;
 use sightline_world::target_truth::TruthSource;
 use sightline_world::{Scenario, Special, SurfaceId, World, choose_special, choose_targets, is_on_boundary};
 
-/// Targets on boundaries, and targets that leave the image, that are asked for in each world.
+/// Number of special targets (on boundaries, or leaving the image) requested in each world.
 const SPECIAL_COUNT: u32 = 6;
 
-/// The targets of a point in a simulated world.
+/// Chooses the targets of a point in a simulated world.
 ///
 /// # Errors
-/// A recorded traverse, whose surface nobody knows.
+/// A recorded traverse, whose true surface is unknown.
 pub fn choose(traverse: &Traverse, scenario: &Scenario, point: &Point) -> Result<Vec<Chosen>> {
     let world = traverse
         .world()
@@ -45,7 +45,7 @@ pub fn choose(traverse: &Traverse, scenario: &Scenario, point: &Point) -> Result
     Ok(chosen)
 }
 
-/// What each pixel belongs to.
+/// The group of each pixel.
 fn groups(
     world: &World,
     scenario: &Scenario,
@@ -71,7 +71,7 @@ fn groups(
     pixels.iter().enumerate().map(of).collect()
 }
 
-/// Whether, at any stop, another rock stands nearer in the window around the target, or hides it.
+/// Returns whether, at any stop, another rock is nearer in the window around the target, or occludes it.
 fn is_passed(world: &World, traverse: &Traverse, pixel: Pixel, window_px: u32) -> bool {
     let surface_at = |stop: usize, pixel: Pixel| {
         let site_from_rover = traverse.true_site_from_rover(stop)?;
@@ -96,7 +96,7 @@ fn is_passed(world: &World, traverse: &Traverse, pixel: Pixel, window_px: u32) -
     })
 }
 
-/// Finds, in the truth, the step at which the fault meets each target.
+/// Determines, from the truth, the step at which the fault affects each target.
 fn find_fault_steps(traverse: &Traverse, point: &Point, fault: Fault, chosen: &mut [Chosen]) -> Result<()> {
     let fixed = match fault {
         Fault::Cloud(step) | Fault::AzimuthJump(step) | Fault::HeadingJump { step, .. } => Some(step),
@@ -118,12 +118,12 @@ fn find_fault_steps(traverse: &Traverse, point: &Point, fault: Fault, chosen: &m
             }
         }
     }
-    // What is so from the beginning does not happen on the way.
+    // A condition that is true from the beginning is no event of the drive.
     chosen.iter_mut().for_each(|target| target.fault_step = target.fault_step.filter(|&step| step > 0));
     Ok(())
 }
 
-/// Whether a fault meets a surface point at a stop.
+/// Returns whether a fault affects a surface point at a stop.
 fn is_met(traverse: &Traverse, world: &World, stop: usize, point: &Point3, fault: Fault) -> bool {
     let Some(site_from_rover) = traverse.true_site_from_rover(stop) else { return false };
     let camera_in_site = traverse.true_left_camera(stop).moved(&site_from_rover);

@@ -1,9 +1,9 @@
-//! What is to be done: a study with its configurations and its grid, all checked before anything is rendered; and the
-//! key under which the result of each piece is kept.
+//! Plan of a study: its configurations and grid, validated before anything is rendered, and the keys under which results
+//! are stored.
 //!
-//! A *unit* is one configuration at one point in one world. Its key is the SHA-256 of everything that decides its
-//! result: the scenario with its seed, the point, the settings, and the sources of this crate and of all that it
-//! depends on. A stored result with the same key is not computed again; after a change of the code no stored key fits.
+//! A *unit* is one configuration at one point in one world. Its key is the SHA-256 of all inputs of its result: the
+//! scenario with its seed, the point, the settings, and the sources of this crate and of its dependencies. A stored
+//! result with the same key is not computed again; a change of the code invalidates all stored keys.
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -16,24 +16,24 @@ use sightline_track::presets::preset;
 use sightline_track::settings::{Changes, Settings, parse_assignment};
 use sightline_world::Scenario;
 
-/// Digest of the sources that decide a result, from the build script.
+/// Digest of the sources that determine a result, from the build script.
 const SOURCES: &str = env!("SIGHTLINE_STUDY_SOURCES");
 
-/// Key of the code that decides a result.
+/// Key of the code that determines a result.
 pub(crate) fn code_key() -> String {
     SOURCES[..16].to_owned()
 }
 
-/// The most configurations of a study.
+/// Largest number of configurations of a study.
 const CONFIGURATION_LIMIT: usize = 32;
 
-/// The most points of a grid.
+/// Largest number of points of a grid.
 const GRID_LIMIT: usize = 64;
 
-/// One configuration of the tracker, as a person names it.
+/// A named configuration of the tracker.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Configuration {
-    /// Its name: a preset's, and changes to it, joined by plus signs.
+    /// A preset's name, followed by changes, joined by plus signs.
     pub name: String,
     /// The settings.
     pub settings: Settings,
@@ -43,7 +43,7 @@ impl Configuration {
     /// Reads `preset` or `preset+key=value+key=value`.
     ///
     /// # Errors
-    /// An unknown preset, with those that are known; a setting that does not exist or is out of range.
+    /// An unknown preset; the message lists the known ones. A setting that does not exist or is out of range.
     pub fn parse(text: &str) -> Result<Self> {
         let mut parts = text.split('+').map(str::trim);
         let name = parts.next().unwrap_or_default();
@@ -52,22 +52,22 @@ impl Configuration {
     }
 }
 
-/// A study that can be run.
+/// A validated study.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// The study.
     pub study: &'static Study,
-    /// The configurations, in the order in which they were asked for.
+    /// Configurations, in the requested order.
     pub configurations: Vec<Configuration>,
     /// The points of the grid.
     pub points: Vec<Point>,
 }
 
 impl Plan {
-    /// Checks what was asked for; nothing asked for is the study's own.
+    /// Validates a request; an empty list selects the study's own configurations or grid.
     ///
     /// # Errors
-    /// An unknown study, configuration or setting, a value that the grid cannot hold, or too much of them.
+    /// An unknown study, configuration or setting, a value that the grid does not accept, or too many of them.
     pub fn new(study: &str, configurations: &[String], grid: &[String]) -> Result<Self> {
         let study = Study::named(study)?;
         let own: Vec<String> = study.default_configurations().into_iter().map(str::to_owned).collect();
@@ -93,7 +93,7 @@ impl Plan {
         Ok(Self { study, configurations: parsed, points })
     }
 
-    /// The scenarios of the grid, each once.
+    /// The scenarios of the grid, without duplicates.
     pub fn scenarios(&self) -> Vec<&str> {
         let mut names: Vec<&str> = Vec::new();
         for point in &self.points {
@@ -107,7 +107,7 @@ impl Plan {
     /// The settings of a configuration at a point.
     ///
     /// # Errors
-    /// A change of the point that does not fit the settings.
+    /// A change of the point that is not valid for the settings.
     pub fn settings(configuration: &Configuration, point: &Point) -> Result<Settings> {
         let changes = point.changes.iter().map(|text| parse_assignment(text)).collect::<Result<Changes>>()?;
         configuration.settings.with(&changes)
@@ -119,7 +119,7 @@ pub fn key(scenario: &Scenario, point: &Point, settings: &Settings) -> String {
     Decides { sources: SOURCES, scenario, point, settings }.key()
 }
 
-/// Everything that decides a result.
+/// All inputs that determine a result.
 #[derive(Serialize)]
 struct Decides<'a> {
     sources: &'a str,
@@ -129,30 +129,30 @@ struct Decides<'a> {
 }
 
 impl Decides<'_> {
-    /// The first 32 hexadecimal digits of the SHA-256 of its JSON.
+    /// The first 32 hexadecimal digits of the SHA-256 of the JSON.
     fn key(&self) -> String {
         let bytes = serde_json::to_vec(self).unwrap_or_default();
         Sha256::digest(bytes).iter().take(16).map(|byte| format!("{byte:02x}")).collect()
     }
 }
 
-/// What is kept of a unit: one line of the file of results.
+/// Stored result of a unit: one line of the results file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Unit {
-    /// Its key.
+    /// Key of the unit.
     pub key: String,
-    /// The scenario's name.
+    /// Name of the scenario.
     pub scenario: String,
-    /// The world's seed.
+    /// Seed of the world.
     pub seed: u64,
-    /// The configuration's name.
+    /// Name of the configuration.
     pub configuration: String,
     /// The point of the grid.
     pub point: Point,
-    /// What odometry did in the drive, where the study asks.
+    /// Performance of odometry in the drive; `None` unless the study uses odometry.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub odometry: Option<DriveOdometry>,
-    /// The runs, one a target.
+    /// Runs, one per target.
     pub runs: Vec<super::run::Run>,
 }
 

@@ -1,4 +1,4 @@
-//! One point of a study's grid: which scenario, which of its stops and targets, what is changed and what goes wrong.
+//! One point of a study's grid: scenario, visited stops, targets, changes and fault.
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -6,25 +6,25 @@ use serde_json::Value;
 use sightline_rover::visual_odometry::OdometryMode;
 use sightline_track::settings::TrackerKind;
 
-/// Which stops of a drive are visited.
+/// Visited stops of a drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Visit {
-    /// Every so many stops, from the first on.
+    /// Every n-th stop, starting at the first.
     Every(usize),
-    /// All but `count` stops from `first` on: one step that is larger than the others.
+    /// All but `count` stops starting at `first`: one step is larger than the others.
     LeavingOut {
-        /// The first stop that is left out; the jump leads to the step of this number.
+        /// First omitted stop; the jump leads to the step with this number.
         first: usize,
-        /// How many stops are left out.
+        /// Number of omitted stops.
         count: usize,
     },
-    /// All stops but the last, at which other cameras take over; all of them where the tracker hands the target over.
+    /// All stops but the last, which is for other cameras; all stops with a tracker that hands the target off.
     AllButLast,
 }
 
 impl Visit {
-    /// The same for a tracker.
+    /// Returns the visited stops for a tracker.
     #[must_use]
     pub const fn by(self, tracker: TrackerKind) -> Self {
         match self {
@@ -33,7 +33,7 @@ impl Visit {
         }
     }
 
-    /// The stops that are visited of `count`.
+    /// Indices of the visited stops of a drive with `count` stops.
     pub fn stops(self, count: usize) -> Vec<usize> {
         match self {
             Self::Every(stride) => (0..count).step_by(stride.max(1)).collect(),
@@ -45,72 +45,72 @@ impl Visit {
     }
 }
 
-/// Which pixels of the first left image become targets.
+/// Selection of target pixels in the first left image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Picks {
     /// By the scenario's own rule.
     Rule,
-    /// On occluding boundaries, which the rule of the window forbids (R20).
+    /// On occluding boundaries, which the window rule forbids (R20).
     Boundary,
-    /// Off to the side, so that they leave the left image before the last stop.
+    /// Near the side, so that they leave the left image before the last stop.
     Leaving,
 }
 
-/// What goes wrong, and how the step at which it does is found (R88, R126).
+/// Kind of fault, and definition of its step (R88, R126).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fault {
-    /// Something stands before the target: the first step at which its point is hidden.
+    /// Something occludes the target: the first step at which its point is hidden.
     Occlusion,
-    /// A cloud darkens everything at this step.
+    /// A cloud darkens the scene at this step.
     Cloud(usize),
     /// The rover's shadow falls on the target: the first step at which its point is in shadow.
     Shadow,
-    /// The window shows something farther behind from the start: the first step.
+    /// The window includes background from the start: the first step.
     Boundary,
-    /// The line of sight turns by more than the nominal step at this step.
+    /// The line of sight rotates by more than the nominal step at this step.
     AzimuthJump(usize),
-    /// The target leaves the left image: the first step at which its point is not seen.
+    /// The target leaves the left image: the first step at which its point is not visible.
     OutOfFrame,
     /// The estimated heading jumps at this step.
     HeadingJump {
-        /// The step.
+        /// Step of the jump.
         step: usize,
-        /// By how much, degrees.
+        /// Change of the heading, degrees, clockwise seen from above.
         yaw_deg: f64,
     },
-    /// The estimated position jumps sideways at the last stop of the first cameras, one before the last.
+    /// The estimated position jumps sideways at the last but one visited stop, the last of the first cameras.
     PositionJump {
-        /// By how much, to the right, m.
+        /// Displacement to the right, m.
         across_m: f64,
     },
-    /// Nothing but what the point itself changes: the first step.
+    /// No fault except the point's own changes: the first step.
     FromTheStart,
 }
 
 /// One point of a study's grid.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Point {
-    /// The scenario, by its name in the library.
+    /// Name of the scenario in the library.
     pub scenario: String,
-    /// The study's variables at this point, by name.
+    /// The study's variables at this point: name and value.
     pub variables: Vec<(String, Value)>,
-    /// The stops that are visited.
+    /// Visited stops.
     pub visit: Visit,
-    /// The targets.
+    /// Selection of the targets.
     pub picks: Picks,
-    /// Settings that belong to the point, as `key=value`; they come after those of the configuration.
+    /// Settings of the point, as `key=value`; applied after those of the configuration.
     pub changes: Vec<String>,
-    /// What goes wrong.
+    /// The fault; `None` without one.
     pub fault: Option<Fault>,
-    /// What visual odometry is used for in the drive; `None` where the study does not ask: the poses are those of the scenario.
+    /// Use of visual odometry in the drive; `None`: the poses are those of the scenario.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub odometry: Option<OdometryMode>,
 }
 
 impl Point {
-    /// All stops and the scenario's own targets, with nothing changed and nothing wrong.
+    /// All stops and the scenario's own targets, without changes or faults.
     pub fn plain(scenario: &str, variable: &str, value: impl Into<Value>) -> Self {
         Self {
             scenario: scenario.to_owned(),

@@ -1,17 +1,17 @@
-//! Approaches that are drawn, not staged: what the paper claims of any drive of 10 m (K abstract, R127).
+//! Randomised approaches: the paper's claim for any drive of 10 m (K abstract, R127).
 //!
-//! The seed of a world draws its surface, rocks and texture, as always, and here also how the rover comes to it:
+//! The seed of a world draws its surface, rocks and texture, as always, and here also the approach:
 //!
-//! | what | from | to |
+//! | quantity | from | to |
 //! |---|---|---|
-//! | distance at the pick | 9.5 m | 10.5 m |
-//! | direction of the targets at the pick, to either side | 0° | 20° |
+//! | distance at the designation | 9.5 m | 10.5 m |
+//! | bearing of the targets at the designation, to either side | 0° | 20° |
 //! | heading in the site | −180° | 180° |
 //! | sun's azimuth | 0° | 360° |
-//! | sun's height | 25° | 65° |
+//! | sun's elevation | 25° | 65° |
 //!
-//! The rover turns to the targets first and then drives straight, in steps of 10 % to 2 m (R104); each mast angle is
-//! wrong by 0.05° (1σ, domain.md 4.5). Everything else is that of the scenario `approach-10`.
+//! The rover turns towards the targets and then drives straight, in steps of 10 % to 2 m (R104); each mast angle has an
+//! error of 0.05° (1σ, domain.md 4.5). Everything else is as in the scenario `approach-10`.
 
 use rand::RngExt;
 use rand_pcg::Pcg64;
@@ -20,21 +20,21 @@ use sightline_geometry::error::Result;
 use sightline_world::scenario::{Course, Move};
 use sightline_world::{Scenario, library};
 
-/// The name under which drawn approaches go.
+/// Scenario name of the randomised approaches.
 pub(crate) const CLAIM: &str = "claim";
 
-/// The stream of random numbers that is ours among those of a seed.
+/// Stream of the random generator, distinct from the other streams of a seed.
 const STREAM: u128 = 0x0c1a_1a5e_ed00_0127;
 
-/// The scenario of the library from which the worlds of that name are made.
+/// The scenario of the library on which the worlds of a name are based.
 ///
 /// # Errors
-/// A name that the library does not have.
+/// A name that is not in the library.
 pub fn base(name: &str) -> Result<Scenario> {
     library::scenario(if name == CLAIM { "approach-10" } else { name })
 }
 
-/// The world of a seed: that of the scenario, or, for the claim, one whose drive and light are drawn as well.
+/// World of a seed: that of the scenario, or, for the claim, one with drive and light also drawn from the seed.
 pub fn world(name: &str, base: &Scenario, seed: u64) -> Scenario {
     let mut world = Scenario { seed, ..base.clone() };
     if name != CLAIM {

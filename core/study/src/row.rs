@@ -1,12 +1,12 @@
-//! The rows of a study's table: one for each configuration, seed and point of the grid.
+//! Rows of a study's table: one per configuration, seed and point of the grid.
 //!
-//! Counts are of runs, one a target, judged at the last step (R116), unless they end in `_steps`. Targets on an occluding
-//! boundary that stand among others are counted apart, as the paper does (R119), and so are those before which another
-//! rock passes on the way. A refused designation is a target that
-//! was not tracked, and so is one at which the drive ended early because the wheels slipped (`not_driven`). *False tracking*: state `tracking` while not tracked. *False loss*: lost or failed while the
-//! evidence, had it been accepted, was right. Where the truth is hidden at the last step the run is `unjudged`.
+//! Counts are of runs, one per target, judged at the last step (R116), unless they end in `_steps`. Targets on an
+//! occluding boundary among others are counted separately, as in the paper (R119), and so are those in front of which
+//! another rock passes. Refused designations, and targets whose drive ended early because of slip (`not_driven`), count
+//! as not tracked. *False tracking*: state `tracking` while not tracked. *False loss*: lost or failed while the
+//! evidence, had it been accepted, was right. If the truth is hidden at the last step, the run is `unjudged`.
 //!
-//! Errors at the last step come with their number: `err_px`, `err_m` and `drift_m` of the runs that are tracked, and
+//! Errors at the last step have their number beside them: `err_px`, `err_m` and `drift_m` of the tracked runs, and
 //! `err_all_m` and `drift_all_m` of all runs that were not refused.
 
 use std::collections::BTreeMap;
@@ -26,37 +26,37 @@ use super::plan::Unit;
 use super::run::{Fate, Run};
 use super::spread::spread;
 
-/// The group of targets on an occluding boundary.
+/// Group of targets on an occluding boundary.
 pub(crate) const BOUNDARY: &str = "boundary";
 
-/// The group of targets before which another rock passes on the way.
+/// Group of targets in front of which another rock passes.
 pub(crate) const PASSED: &str = "passed";
 
-/// One row; it is flat when it is written.
+/// One row; flat when serialised.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Row {
-    /// The study.
+    /// Name of the study.
     pub study: String,
-    /// The configuration's name.
+    /// Name of the configuration.
     pub configuration: String,
-    /// The scenario.
+    /// Name of the scenario.
     pub scenario: String,
-    /// The world's seed.
+    /// Seed of the world.
     pub seed: u64,
-    /// The study's variables and everything that was counted and measured, by name.
+    /// The study's variables, counts and measured values, by name.
     #[serde(flatten)]
     #[schema(additional_properties, value_type = Object)]
     pub columns: BTreeMap<String, Value>,
 }
 
 impl Row {
-    /// A column as a number.
+    /// A column as a number; `None` if it is missing or no number.
     pub fn number(&self, column: &str) -> Option<f64> {
         self.columns.get(column)?.as_f64()
     }
 }
 
-/// The rows of a unit: one, or one a step where the study is of single steps.
+/// Rows of a unit: one, or one per step for studies of single steps.
 pub fn rows(study: &Study, unit: &Unit) -> Vec<Row> {
     let row = |columns: BTreeMap<String, Value>| Row {
         study: study.name.to_owned(),
@@ -74,7 +74,7 @@ pub fn rows(study: &Study, unit: &Unit) -> Vec<Row> {
     }
 }
 
-/// Counts and errors of runs in so many worlds.
+/// Counts and errors of runs in `worlds` worlds.
 pub fn columns(runs: &[&Run], worlds: usize) -> BTreeMap<String, Value> {
     let is_apart = |run: &Run| run.group == BOUNDARY || run.group == PASSED;
     let among_others = runs.iter().any(|run| !is_apart(run));
@@ -118,7 +118,7 @@ pub fn columns(runs: &[&Run], worlds: usize) -> BTreeMap<String, Value> {
     columns
 }
 
-/// Whether a run is tracked at the last step of the drive.
+/// Returns whether a run is tracked at the last step of the planned drive.
 pub fn is_tracked(run: &Run) -> bool {
     run.summary.run_tracked == Some(true) && !run.is_not_driven()
 }
@@ -145,7 +145,7 @@ fn counts(runs: &[&Run]) -> BTreeMap<String, Value> {
     .into()
 }
 
-/// What the confidence was worth, and the errors of the measured motions, where any were measured.
+/// Reliability of the confidence, and errors of the measured motions; empty if none were measured.
 fn trust(runs: &[&Run]) -> BTreeMap<String, Value> {
     let mut columns = BTreeMap::new();
     let of = |values: fn(&Trust) -> &Vec<f64>| -> Vec<f64> {
@@ -167,7 +167,7 @@ fn trust(runs: &[&Run]) -> BTreeMap<String, Value> {
     columns
 }
 
-/// What became of the cases of a fault: at its step, and at the end.
+/// Outcomes of the cases of a fault: at its step, and at the end.
 fn faults(runs: &[&Run]) -> BTreeMap<String, Value> {
     let cases: Vec<&&Run> =
         runs.iter().filter(|run| run.fault_step.is_some() && run.at_fault.is_some()).collect();
@@ -191,7 +191,7 @@ fn faults(runs: &[&Run]) -> BTreeMap<String, Value> {
     .into()
 }
 
-/// The rows of a single run, one a step after the designation.
+/// Rows of a single run, one per step.
 fn by_step(run: &Run) -> Vec<BTreeMap<String, Value>> {
     if run.refused.is_some() {
         let columns = [("position", 1), ("targets", 1), ("refused", 1), ("tracked", 0)];

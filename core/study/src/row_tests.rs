@@ -1,4 +1,4 @@
-//! Counting and averaging: on runs whose verdicts are written down.
+//! Counts and averages of runs with given verdicts.
 
 use super::*;
 use crate::point::Point;
@@ -55,7 +55,7 @@ fn a_boundary_target_stands_apart_from_the_others() {
         ["targets", "passed_targets", "boundary_tracked"].map(|name| columns[name].as_u64()),
         [Some(1); 3]
     );
-    // Alone they are what the point is about.
+    // Without other targets they are counted as the point's own.
     assert_eq!(columns_of(&runs[1..])["targets"], 2);
 }
 

@@ -1,15 +1,15 @@
-//! One target tracked in one configuration, judged at every step: the engine of the studies.
+//! One target tracked with one configuration, judged at every step: the engine of the studies.
 //!
-//! All targets of a unit are tracked at the same time, each by the very functions of `session::track`. A step lets go of
-//! its images when the next is there. Judged is by R116 (`truth.rs`); beside it stand
+//! All targets of a unit are tracked in parallel, each by the functions of `session::track`. A step releases its images
+//! once the next is computed. Results are judged by R116 (`truth.rs`), with two further errors:
 //!
 //! * drift: `│ x_end − T_true x_0 │`, where x_0 is the first estimate in the rover frame of the designation and T_true
-//!   the true motion of the rover since: what tracking added to the error of the designation, m;
-//! * the error along the line of sight of the left camera, m; positive: estimated too far.
+//!   the true motion of the rover since: the error that tracking added to that of the designation, m;
+//! * error along the line of sight of the left camera, m; positive: estimated too far.
 //!
 //! At the step of a fault the target is *tracked* (state `tracking`, within the tolerance of R116), *lost* (declared so)
-//! or *false* (says tracked, is not). There the truth is projected even where something hides it: a window of which a
-//! corner is hidden may be tracked rightly.
+//! or *false* (state `tracking`, but wrong). The truth is projected even if it is occluded: a window with an occluded
+//! corner may be tracked correctly.
 
 use std::sync::atomic::AtomicBool;
 
@@ -30,22 +30,22 @@ use sightline_session::track::{self, Drive, NextStep};
 use sightline_track::settings::Settings;
 use sightline_track::target::{Designation, TrackingState};
 
-/// A pixel that is to be tracked.
+/// A pixel to be tracked.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Chosen {
-    /// The pixel of the first left image.
+    /// Pixel of the first left image.
     pub pixel: Pixel,
-    /// What it belongs to: `row-1`, `boundary`, or `all`.
+    /// Group: `row-1`, `boundary`, `passed` or `all`.
     pub group: String,
-    /// The stop of the drive at which something happens to it, where something does.
+    /// Visited step at which the fault affects it; `None` if none does.
     pub fault_step: Option<usize>,
 }
 
-/// What became of a target at one step.
+/// Outcome of a target at one step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fate {
-    /// State `tracking`, and right.
+    /// State `tracking`, and correct.
     Tracked,
     /// Declared lost or failed.
     Lost,
@@ -56,25 +56,25 @@ pub enum Fate {
 /// One target's run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Run {
-    /// The target's number in its world.
+    /// Index of the target in its world.
     pub target: usize,
-    /// What it belongs to.
+    /// Group of the target.
     pub group: String,
     /// The designated pixel.
     pub pixel: Pixel,
-    /// Why no run was possible: the sentence of the refusal.
+    /// Reason why the designation was refused; `None` if it was not.
     pub refused: Option<String>,
     /// Distance from the left camera at designation and at the last step, m.
     pub distance_m: Option<[f64; 2]>,
-    /// The verdict on the whole run.
+    /// Summary of all steps.
     pub summary: Summary,
-    /// The tracking state after the last step.
+    /// Tracking state after the last step.
     pub state: Option<String>,
     /// Located pixel at the last step.
     pub end_pixel: Option<Pixel>,
-    /// The truth's pixel at the last step.
+    /// Pixel of the truth at the last step.
     pub true_end_pixel: Option<Pixel>,
-    /// What tracking added to the error, m.
+    /// Error added by tracking, m.
     pub drift_m: Option<f64>,
     /// Error at the last step along the line of sight, m.
     pub err_range_m: Option<f64>,
@@ -82,46 +82,46 @@ pub struct Run {
     pub sigma_m: Option<f64>,
     /// Squared Mahalanobis distance of the error at the last step.
     pub nees: Option<f64>,
-    /// What the confidence was worth, and how far the measured motions were off.
+    /// Reliability of the confidence, and errors of the measured motions.
     #[serde(default)]
     pub trust: Trust,
-    /// What the shape was worth, where it was asked.
+    /// Errors of the shape tracker; default without one.
     #[serde(default)]
     pub hand_over: HandOver,
-    /// Why it was lost, where the study asks for the effect of the poses.
+    /// Cause of the loss; `None` unless the study uses odometry.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub by_pose: Option<ByPose>,
-    /// What became of it at the last step; null without truth.
+    /// Outcome at the last step; null without truth.
     pub end: Option<Fate>,
     /// Whether the last step was lost although its evidence was right.
     pub end_is_false_loss: bool,
-    /// The step of the fault, where there was one.
+    /// Visited step of the fault; null without one.
     pub fault_step: Option<usize>,
-    /// What became of it at that step.
+    /// Outcome at that step.
     pub at_fault: Option<Fate>,
-    /// Steps from the fault on that were false.
+    /// Number of false steps from the fault on.
     pub false_after_fault: usize,
-    /// Every step, where the study asks for them.
+    /// Every step; empty unless the study records them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub steps: Vec<StepRecord>,
 }
 
 impl Run {
-    /// Takes in that slip ended the drive at the last step: a target that is tracked there is not driven to the end.
+    /// Records that slip ended the drive at the last step: a target tracked there counts as not driven to the end.
     pub fn end_early(&mut self) {
         let is_tracked = self.end == Some(Fate::Tracked);
         self.by_pose.iter_mut().for_each(|by_pose| by_pose.not_driven = is_tracked);
     }
 
-    /// Whether it was tracked at the stop at which slip ended the drive.
+    /// Returns whether it was tracked at the stop at which slip ended the drive.
     pub(crate) fn is_not_driven(&self) -> bool {
         self.by_pose.as_ref().is_some_and(|by_pose| by_pose.not_driven)
     }
 }
 
-/// Who waits for a study: told after every run, and able to stop it.
+/// Progress callback and cancellation of a study.
 pub struct Watch<'a> {
-    /// Stops the study soon after it is set.
+    /// Set to stop the study soon.
     pub cancel: &'a AtomicBool,
     /// Called after every run, from several threads.
     pub tell: &'a (dyn Fn() + Sync),
@@ -130,7 +130,7 @@ pub struct Watch<'a> {
 /// Tracks every target of a point through a drive.
 ///
 /// # Errors
-/// [`Error::Cancelled`] soon after the watch is told to end.
+/// [`Error::Cancelled`] soon after `watch.cancel` is set.
 pub fn measure<D: Drive>(
     drive: &D,
     point: &Point,
@@ -155,7 +155,7 @@ pub fn measure<D: Drive>(
     chosen.par_iter().enumerate().map(one).collect()
 }
 
-/// A run that is being made.
+/// A run in progress.
 struct Follower {
     run: Run,
     keep_steps: bool,
@@ -263,7 +263,7 @@ impl Follower {
     }
 }
 
-/// Adds a later part of a run to the summary of what came before.
+/// Adds the summary of later steps to that of the earlier ones.
 fn add(sum: &mut Summary, part: &Summary) {
     let more = |sum: Option<usize>, part: Option<usize>| match (sum, part) {
         (None, None) => None,
@@ -279,7 +279,7 @@ fn add(sum: &mut Summary, part: &Summary) {
         (part.run_tracked, part.final_err_px, part.final_err_m);
 }
 
-/// What became of the target at a step; none without truth.
+/// Outcome of the target at a step; `None` without truth.
 fn fate<D: Drive>(drive: &D, trace: &RunStep) -> Option<Fate> {
     let truth = trace.truth.as_ref()?;
     if trace.update.state != TrackingState::Tracking {
@@ -293,7 +293,7 @@ fn fate<D: Drive>(drive: &D, trace: &RunStep) -> Option<Fate> {
     Some(if error_px.is_some_and(|error| error <= truth.tolerance_px) { Fate::Tracked } else { Fate::False })
 }
 
-/// How far the last estimate lies from the first one, carried by the true motion, m.
+/// Distance between the last estimate and the first one moved by the true motion, m.
 fn drift_m<D: Drive>(drive: &D, first: &RunStep, last: &RunStep) -> Option<f64> {
     let site_from_first = drive.true_site_from_rover(first.step)?;
     let site_from_last = drive.true_site_from_rover(last.step)?;

@@ -1,4 +1,4 @@
-//! The engine on a world whose truth is a formula: a tracker that works, one that is made to fail, and faults.
+//! The engine on an analytic world: a tracker that works, one that is made to fail, and faults.
 
 use super::*;
 use crate::point::Visit;
@@ -46,7 +46,7 @@ fn targets_on_a_plane_are_tracked_and_their_drift_is_what_is_left_of_the_error()
 
 #[test]
 fn a_tracker_whose_every_match_is_refused_loses_all_targets_although_its_evidence_is_right() {
-    // No match is as sharp as a thousandth of a pixel.
+    // No match has a standard deviation of a thousandth of a pixel.
     let refusing = settings(&[("match_sigma_max_px", 0.001.into())]);
     let runs = track(&drive(), &plain(), &chosen(), &refusing);
     for run in &runs {
@@ -57,8 +57,8 @@ fn a_tracker_whose_every_match_is_refused_loses_all_targets_although_its_evidenc
 
 #[test]
 fn a_tracker_that_believes_the_wrong_place_is_false_and_not_lost() {
-    // The estimate says that the rover turned by 4°; the window of search is too small to find the truth, and no
-    // threshold is left to notice.
+    // The estimated heading jumps by 4°; the search window is too small to contain the truth, and all gates are
+    // disabled.
     let mut point = plain();
     point.fault = Some(Fault::HeadingJump { step: 3, yaw_deg: 4.0 });
     let mut chosen = chosen();

@@ -1,4 +1,4 @@
-//! The spread of values as columns of a study's table.
+//! Statistics of values as columns of a study's table.
 
 use std::collections::BTreeMap;
 
@@ -6,10 +6,10 @@ use serde_json::Value;
 
 use sightline_geometry::estimate::quantile::{median, quantile_of_sorted};
 
-/// Number, median, 95th percentile and root mean square.
+/// Adds count, median, 95th percentile and root mean square.
 pub(super) fn spread(columns: &mut BTreeMap<String, Value>, name: &str, values: &[f64]) {
     let mut sorted = values.to_vec();
-    // The sum below is over ascending values.
+    // Summation in ascending order reduces rounding.
     sorted.sort_by(f64::total_cmp);
     let rms = (!sorted.is_empty())
         .then(|| (sorted.iter().map(|v| v * v).sum::<f64>() / sorted.len() as f64).sqrt());

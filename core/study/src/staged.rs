@@ -1,12 +1,13 @@
-//! A drive as a study stages it: only some stops are visited, and the estimated pose may jump.
+//! A drive as modified by a study: only some stops are visited, and the estimated pose may jump.
 //!
-//! Larger steps are had over the same images (R111): skipping n images at a time turns steps of 5 % into steps of
-//! 1 − 0.95^(n+1): 9.75, 14.26, 18.55 and 22.62 %. The last stop is visited only where the stride meets it (E6).
+//! Larger steps use the same images (R111): skipping n images at a time turns steps of 5 % into steps of 1 − 0.95^(n+1):
+//! 9.75, 14.26, 18.55 and 22.62 %. The last stop is visited only if it is a multiple of the stride (E6).
 //!
-//! A jump turns the rover's estimated attitude from one visited stop on, as an estimator does that has lost its
-//! way: `site_from_rover' = site_from_rover · R_z(jump)`; or it moves its position sideways, `site_from_rover · t_y(jump)`. The truth, the cameras and the images stay.
+//! A jump rotates the rover's estimated attitude from one visited stop on, as if the estimator had diverged:
+//! `site_from_rover' = site_from_rover · R_z(jump)`. Or it translates the estimated position sideways:
+//! `site_from_rover · t_y(jump)`. Truth, cameras and images are unchanged.
 //!
-//! Steps of the staged drive are numbered from 0 anew; poses, cameras, images and truth are those of the drive.
+//! Steps of the staged drive are renumbered from 0; poses, cameras, images and truth are those of the drive.
 
 use nalgebra::{Translation3, UnitQuaternion};
 
@@ -33,19 +34,19 @@ pub struct Staged<'a, D: Drive> {
 }
 
 impl<'a, D: Drive> Staged<'a, D> {
-    /// Visits the stops that `visit` names.
+    /// Visits the stops selected by `visit`.
     pub fn new(drive: &'a D, visit: Visit) -> Self {
         Self { drive, stops: visit.stops(drive.stop_count()), jump: None }
     }
 
-    /// The same with an estimated heading that jumps by `yaw_rad` (clockwise seen from above) at a visited stop.
+    /// Adds a jump of the estimated heading by `yaw_rad` (clockwise seen from above) at a visited stop.
     #[must_use]
     pub(crate) fn with_heading_jump(self, step: usize, yaw_rad: f64) -> Self {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad);
         Self { jump: Some((step, Pose::from_parts(Translation3::identity(), turn))), ..self }
     }
 
-    /// The same with an estimated position that jumps by `across_m` to the right at the last stop but one.
+    /// Adds a jump of the estimated position by `across_m` to the right at the last stop but one.
     #[must_use]
     pub fn with_position_jump(self, across_m: f64) -> Self {
         let step = self.stops.len().saturating_sub(2);
@@ -80,7 +81,7 @@ impl<D: Drive> Stops for Staged<'_, D> {
         self.drive.odometry_error()
     }
     fn measured_motion(&self, step: usize) -> Option<&MeasuredMotion> {
-        // It is that from the stop before, and without the jump.
+        // The measured motion is from the previous stop, and does not include the jump.
         let is_next = step > 0 && self.stops[step] == self.stops[step - 1] + 1;
         let is_jump = self.jump.is_some_and(|(from, _)| from == step);
         self.drive.measured_motion(self.stops[step]).filter(|_| is_next && !is_jump)
@@ -159,7 +160,7 @@ mod tests {
             assert_eq!(staged.site_from_rover(step), drive.site_from_rover(stop));
             assert_eq!(staged.true_site_from_rover(step), drive.true_site_from_rover(stop));
         }
-        // Every fourth stop passes the last one by.
+        // Every fourth stop omits the last one.
         assert_eq!(Staged::new(&drive, Visit::Every(4)).stop_count(), 2);
         assert_eq!(Staged::new(&drive, Visit::Every(0)).stop_count(), 7);
     }

@@ -1,12 +1,12 @@
-//! One step of a checkout beside the geometry of the drive that staged it (K§7.1, Table III, R130–R135).
+//! One step of a checkout compared with the geometry of its staged drive (K§7.1, Table III, R130–R135).
 //!
-//! Magnification and roll are those of one update, from the last stop to this one, by the formulas of K-Eq 6–10: once
-//! from the tracker's estimates, which is what it scales and rolls by where it renews its template at every stop, and
-//! once from the true poses, cameras and target, which the staged drive fixes. The azimuth is that of the line of sight
-//! from the left camera to the target in the site frame, which does not turn with the rover (R135, E8); the bearing
-//! beside it is relative to the rover. Both grow clockwise, seen from above.
+//! Magnification and roll are those of one update, from the previous stop to this one, by the formulas of K-Eq 6–10:
+//! once from the tracker's estimates, which scale and roll the template if it is renewed at every stop, and once from
+//! the true poses, cameras and target of the staged drive. The azimuth is that of the line of sight from the left camera
+//! to the target in the site frame, which does not rotate with the rover (R135, E8); the bearing is relative to the
+//! rover. Both increase clockwise, seen from above.
 //!
-//! Units: px, m, degrees, because people read these rows. Frames: site and rover.
+//! Units: px, m, degrees, for readability. Frames: site and rover.
 
 use serde::{Deserialize, Serialize};
 
@@ -17,28 +17,28 @@ use sightline_session::track::Drive;
 use sightline_track::locate::template::scale_roll::geometry;
 use sightline_track::locate::template::settings::RollReference;
 
-/// What one update looked like and what it should have looked like.
+/// Estimated and true values of one update.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StepRecord {
-    /// The rover's position, from 1 as the paper counts.
+    /// Position of the rover, counted from 1 as in the paper.
     pub position: usize,
-    /// The tracking state's word.
+    /// Tracking state.
     pub state: String,
-    /// Whether it is tracked against the truth.
+    /// Whether it is tracked according to the truth; `None` without truth.
     pub tracked: Option<bool>,
     /// Whether it was lost although its evidence was right.
     pub is_false_loss: bool,
-    /// Magnification since the last stop by the estimates.
+    /// Magnification since the previous stop, from the estimates.
     pub magnification: Option<f64>,
-    /// The same by the truth.
+    /// Magnification since the previous stop, from the truth.
     pub magnification_true: Option<f64>,
-    /// Roll since the last stop by the estimates, degrees.
+    /// Roll since the previous stop, from the estimates, degrees.
     pub roll_deg: Option<f64>,
-    /// The same by the truth, degrees.
+    /// Roll since the previous stop, from the truth, degrees.
     pub roll_true_deg: Option<f64>,
-    /// Change of the line of sight's azimuth by the estimates, degrees.
+    /// Change of the azimuth of the line of sight, from the estimates, degrees.
     pub azimuth_change_deg: Option<f64>,
-    /// The same by the truth, degrees.
+    /// Change of the azimuth of the line of sight, from the truth, degrees.
     pub azimuth_change_true_deg: Option<f64>,
     /// True direction of the target relative to the rover's heading, degrees.
     pub bearing_deg: Option<f64>,
@@ -48,9 +48,9 @@ pub struct StepRecord {
     pub ncc: Option<f64>,
     /// Score of point stereo.
     pub stereo_score: Option<f64>,
-    /// How far the match lies from the predicted pixel, px.
+    /// Distance between the match and the predicted pixel, px.
     pub correction_px: Option<f64>,
-    /// How far the target has moved in the site frame since the designation, m.
+    /// Displacement of the target in the site frame since the designation, m.
     pub total_correction_m: f64,
     /// Error against the truth, px.
     pub err_px: Option<f64>,
@@ -58,7 +58,7 @@ pub struct StepRecord {
     pub err_m: Option<f64>,
 }
 
-/// Where a target stands at a stop: the pose, the left camera and the target in the rover frame.
+/// Pose, left camera and target (rover frame) at a stop.
 struct Stand<'a> {
     site_from_rover: Pose,
     camera: &'a Camera,
@@ -66,7 +66,7 @@ struct Stand<'a> {
 }
 
 impl StepRecord {
-    /// The record of a step and the one before it.
+    /// Compares a step with the previous one.
     pub fn of<D: Drive>(drive: &D, before: Option<&RunStep>, trace: &RunStep) -> Self {
         let (row, target) = (trace.row(), &trace.update.target);
         let estimated = |trace: &RunStep| Stand {
@@ -115,19 +115,19 @@ impl StepRecord {
 }
 
 impl Stand<'_> {
-    /// From the left camera to the target, rover frame, m.
+    /// Vector from the left camera to the target, rover frame, m.
     fn sight(&self) -> Vector3 {
         self.target_in_rover - self.camera.model.centre()
     }
 
-    /// The azimuth of the line of sight in the site frame, degrees.
+    /// Azimuth of the line of sight in the site frame, degrees.
     fn azimuth_deg(&self) -> f64 {
         let sight = self.site_from_rover * self.sight();
         sight.y.atan2(sight.x).to_degrees()
     }
 }
 
-/// Scale and roll between two stops, rad.
+/// Scale, and roll in rad, between two stops; `None` if the geometry is degenerate.
 fn magnification_and_roll(then: &Stand<'_>, now: &Stand<'_>) -> Option<(f64, f64)> {
     let now_from_then = now.site_from_rover.inverse() * then.site_from_rover;
     let (scale, roll_rad, ..) =
@@ -136,7 +136,7 @@ fn magnification_and_roll(then: &Stand<'_>, now: &Stand<'_>) -> Option<(f64, f64
     Some((scale, roll_rad))
 }
 
-/// An angle between −180° and 180°.
+/// Wraps an angle to −180° … 180°.
 fn wrapped_deg(angle_deg: f64) -> f64 {
     (angle_deg + 180.0).rem_euclid(360.0) - 180.0
 }

@@ -1,12 +1,13 @@
-//! Table II (K§5.5, R125) with ours beside it: a line for each terrain, configuration and use of visual odometry, over all worlds.
+//! Table II (K§5.5, R125) compared with ours: a line per terrain, configuration and use of visual odometry, over all
+//! worlds.
 //!
-//! The paper counts trials with one target each, all with visual odometry. Ours are targets, of which a world has many.
+//! The paper counts trials with one target each, all with visual odometry. Ours counts targets, many per world.
 
 use super::paper::{PaperTerrain, TABLE_II};
 use super::row::Row;
 use sightline_geometry::estimate::quantile::median;
 
-/// The headings of the table; [`TerrainLine::cells`] has a cell for each.
+/// Headings of the table, one per cell of [`TerrainLine::cells`].
 pub const HEADINGS: [&str; 18] = [
     "terrain",
     "paper: trials",
@@ -31,34 +32,34 @@ pub const HEADINGS: [&str; 18] = [
 /// One line of the table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TerrainLine {
-    /// The terrain of ours.
+    /// Our terrain.
     pub terrain: String,
-    /// What the paper prints for it; `None` for the stuck rover, whose slip the paper counts among the steep inclines.
+    /// Line of the paper; `None` for the stuck rover, which the paper counts among the steep inclines.
     pub paper: Option<PaperTerrain>,
     /// The configuration.
     pub configuration: String,
-    /// What odometry is used for.
+    /// Use of visual odometry.
     pub odometry: String,
-    /// Worlds.
+    /// Number of worlds.
     pub worlds: usize,
-    /// Targets.
+    /// Number of targets.
     pub targets: u64,
-    /// Targets tracked to the end of the planned drive.
+    /// Number of targets tracked to the end of the planned drive.
     pub kept: u64,
-    /// Lost because of the pose, by the window and by the correction, by the match, and hidden (`by_pose`).
+    /// Numbers of losses by window, correction and match, and of hidden targets (`by_pose`).
     pub lost: [u64; 4],
-    /// Targets that are taken for tracked at the end and are not; they are among those lost.
+    /// Number of targets with false tracking at the end; they are included in the losses.
     pub false_tracked: u64,
-    /// Targets that were tracked where slip ended the drive.
+    /// Number of targets tracked at the stop at which slip ended the drive.
     pub not_driven: u64,
-    /// Distance of the target from its prediction where targets were lost, median over the worlds, px.
+    /// Distance between prediction and target at the losses, median over the worlds, px.
     pub prediction_off_px: Option<f64>,
-    /// Distance of the estimated pose from the true one at the last stop, median over the worlds, m.
+    /// Distance between the estimated and the true pose at the last stop, median over the worlds, m.
     pub pose_err_m: Option<f64>,
 }
 
 impl TerrainLine {
-    /// The cells, one for each of [`HEADINGS`]; a dash where there is nothing.
+    /// Cells, one for each of [`HEADINGS`]; a dash if there is no value.
     pub fn cells(&self) -> [String; HEADINGS.len()] {
         let dash = || "–".to_owned();
         let printed = |of: fn(&PaperTerrain) -> String| self.paper.as_ref().map_or_else(dash, of);
@@ -87,7 +88,7 @@ impl TerrainLine {
     }
 }
 
-/// The table of some rows, in their order; empty for studies that do not ask for odometry.
+/// Table of some rows, in their order; empty for studies without odometry.
 pub fn table(rows: &[Row]) -> Vec<TerrainLine> {
     let word = |row: &Row, name: &str| row.columns.get(name)?.as_str().map(str::to_owned);
     let label = |row: &Row| Some((word(row, "terrain")?, row.configuration.clone(), word(row, "odometry")?));
@@ -97,7 +98,7 @@ pub fn table(rows: &[Row]) -> Vec<TerrainLine> {
             labels.push(label);
         }
     }
-    // Terrain by terrain, as the paper; the rest stays in the order of the rows.
+    // Terrain by terrain, as in the paper; otherwise in the order of the rows.
     let mut terrains: Vec<&String> = Vec::new();
     labels.iter().for_each(|(terrain, ..)| {
         if !terrains.contains(&terrain) {
@@ -134,7 +135,7 @@ fn line((terrain, configuration, odometry): (String, String, String), rows: &[&R
     }
 }
 
-/// The table as lines of text, the first one its head; empty for studies that do not ask for odometry.
+/// Lines of text, the first one the headings; empty for studies without odometry.
 pub fn lines(rows: &[Row]) -> Vec<String> {
     let table: Vec<[String; HEADINGS.len()]> = table(rows).iter().map(TerrainLine::cells).collect();
     if table.is_empty() {

@@ -1,4 +1,4 @@
-//! The true ground of a world as a navigator would know it, and whether a way leads over it: which drives can arrive at all.
+//! Goodness map of a world's true ground, and reachability of a goal over it: which drives can arrive at all.
 
 use rayon::prelude::*;
 
@@ -12,10 +12,10 @@ use sightline_track::target::Designation;
 use sightline_world::World;
 use sightline_world::target_truth::{TargetTruth, TruthSource};
 
-/// Distance of the points of the true map, m.
+/// Spacing of the points of the true map, m.
 const GROUND_STEP_M: f64 = 0.05;
 
-/// Length of a way over the true ground from a pose to a goal, site frame, m; `None` if the search finds none.
+/// Length of a path over the true ground from a pose to a goal, site frame, m; `None` if the search finds none.
 pub fn true_way_m(
     world: &World,
     start: &Pose,
@@ -26,8 +26,8 @@ pub fn true_way_m(
     way(&map, start, goal_m, navigator).map(|motions| motions.iter().map(length_m).sum())
 }
 
-/// The length of a way over the true ground of a world that the rover has not been driven in yet, from the first stop to the goal that
-/// follows from the true target, m; `None` without a way, or where no surface is at the target's pixel.
+/// Length of a path over the true ground, from the first stop to the goal of the true target, m, before the rover has
+/// moved; `None` without a path, or without a surface at the target's pixel.
 pub fn way_to_goal_m(
     begun: &DrivenTraverse,
     command: &DriveCommand,
@@ -48,7 +48,7 @@ fn length_m(motion: &Motion) -> f64 {
     }
 }
 
-/// The goodness map of the true surface, around the middle between a start and a goal.
+/// Goodness map of the true surface, centred between start and goal.
 fn true_map(world: &World, start: &Pose, goal_m: [f64; 2], settings: &HazardSettings) -> GoodnessMap {
     let origin = start.translation.vector;
     let middle = Pose::translation(0.5 * (origin.x + goal_m[0]), 0.5 * (origin.y + goal_m[1]), origin.z);
@@ -64,7 +64,7 @@ fn true_map(world: &World, start: &Pose, goal_m: [f64; 2], settings: &HazardSett
             Some(middle.inverse_transform_point(&hit.point))
         })
         .collect();
-    // Every point was met from above: none is on a face.
+    // Every point was hit from above, so the test for vertical faces does not apply.
     let settings = &HazardSettings { face_spread_m: f64::INFINITY, ..settings.clone() };
     let scan = Scan { points_in_rover: &points, site_from_rover: &middle, driven_m: 0.0, noise: None };
     assess(&map_hazards(None, &scan, settings), &MapRules::default(), settings)

@@ -1,4 +1,4 @@
-//! What page and server say to each other about studies.
+//! Messages about studies between page and server.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -9,21 +9,21 @@ use sightline_world::Scenario;
 /// A study in the server's list.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct StudyInfo {
-    /// Its name.
+    /// Name of the study.
     pub name: String,
-    /// What it asks.
+    /// Question of the study, as one sentence.
     pub question: String,
-    /// Its first variable.
+    /// Name of the first variable.
     pub variable: String,
-    /// The variable's unit, empty for words and pure numbers.
+    /// Unit of the variable, empty for words and pure numbers.
     pub unit: String,
-    /// The values of its grid by default; empty where it has none.
+    /// Default values of its grid; empty without a grid.
     pub grid: Vec<String>,
-    /// Its configurations by default.
+    /// Default configurations.
     pub configurations: Vec<String>,
-    /// The scenarios of its grid by default.
+    /// Scenarios of the default grid.
     pub scenarios: Vec<String>,
-    /// Points per value of the grid; some studies cross their variable with a second one.
+    /// Points per value of the grid; more than 1 if the study has a second variable.
     pub points_per_value: usize,
 }
 
@@ -33,19 +33,19 @@ pub struct StudyInfo {
 pub struct NewStudy {
     /// The study's name.
     pub study: String,
-    /// The seeds of the worlds, each with however many targets it offers; at most 100.
+    /// Seeds of the worlds, each with as many targets as it offers; at most 100.
     #[serde(default)]
     pub seeds: Vec<u64>,
-    /// Without seeds: how many worlds that offer all their targets, 1 to 100 (10).
+    /// Without seeds: number of worlds that offer all their targets, 1 to 100 (10).
     #[serde(default)]
     pub worlds: Option<u64>,
-    /// Without seeds: the first seed that is tried (1).
+    /// Without seeds: first seed to try (1).
     #[serde(default)]
     pub first_seed: Option<u64>,
     /// The configurations, as `preset+key=value`; by default the study's own.
     #[serde(default)]
     pub configurations: Vec<String>,
-    /// Values of the study's variable; by default its own.
+    /// Values of the study's variable; by default the study's own.
     #[serde(default)]
     pub grid: Vec<String>,
     /// A scenario in place of the study's own.
@@ -53,53 +53,53 @@ pub struct NewStudy {
     pub scenario: Option<Scenario>,
 }
 
-/// How a study stands.
+/// State of a study.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum StudyState {
-    /// Others come first.
+    /// Waits for other studies.
     Waiting,
-    /// It is being carried out.
+    /// In progress.
     Running,
-    /// It is done: its report is there.
+    /// Finished; the report is available.
     Done,
-    /// It was cancelled; what it found is kept.
+    /// Cancelled; the results so far are kept.
     Cancelled,
-    /// It could not go on.
+    /// Ended by an error.
     Failed,
 }
 
 /// A study that was started.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct StudyJob {
-    /// Its name in paths.
+    /// Identifier in paths.
     pub id: String,
-    /// The study's name.
+    /// Name of the study.
     pub study: String,
-    /// How it stands.
+    /// State of the job.
     pub state: StudyState,
-    /// Units done: a unit is one configuration at one point of the grid in one world.
+    /// Finished units: a unit is one configuration at one point of the grid in one world.
     pub k: usize,
-    /// Units in all.
+    /// Total number of units.
     pub n: usize,
-    /// Share of the work that is done, from 0 to 1, with the rendering of the worlds.
+    /// Finished fraction of the work, 0 to 1, including the rendering of the worlds.
     #[serde(default)]
     pub share: f64,
     /// Time since the study began or was resumed, s.
     #[serde(default)]
     pub seconds: f64,
-    /// Number of changes of this job so far: the larger one is the newer of two answers.
+    /// Number of changes of this job so far; of two answers, the larger is the newer.
     #[serde(default)]
     pub revision: u64,
-    /// What is being done, in words; why it stopped, where it failed.
+    /// Current activity, or the reason of a failure.
     pub doing: String,
-    /// What was odd on the way, one sentence each.
+    /// Warnings, one sentence each.
     pub notices: Vec<String>,
-    /// The command line that does the same.
+    /// The equivalent command line.
     pub command: String,
 }
 
-/// The table of a study, as far as it is.
+/// The table of a study, as far as it is complete.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct StudyRows {
     /// One row for each configuration, seed and point of the grid.

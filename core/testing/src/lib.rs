@@ -1,8 +1,7 @@
-//! A world for tests whose every grey value is a formula: a textured plane seen by two CAHV or CAHVOR cameras.
+//! A test world with analytic grey values: a textured plane seen by two CAHV or CAHVOR cameras.
 //!
-//! The truth is exact and independent of the resampling and the matching under test: a pixel's value is the
-//! texture where the ray of its centre meets the plane. The shortest wave is six pixels long, so no pixel
-//! aliases.
+//! The ground truth is exact and independent of the resampling and matching under test: a pixel's value is the texture
+//! where the ray through its centre meets the plane. The shortest wavelength is six pixels, so no pixel aliases.
 
 use std::sync::Arc;
 
@@ -19,23 +18,23 @@ use sightline_track::stages::capture::StereoPair;
 use sightline_vision::image::GrayImage;
 use sightline_world::target_truth::TruthSource;
 
-/// What a stop of the test world shows instead of the plane.
+/// A fault of the images at a stop.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Trouble {
-    /// Nothing.
+    /// No fault.
     #[default]
     None,
     /// The image file is missing.
     Missing,
-    /// Both eyes are covered: a constant grey.
+    /// Both cameras are covered: a constant grey.
     Covered,
 }
 
-/// A textured plane of the site frame, `x = const` unless it is turned, before a rover that drives towards it.
+/// A textured plane in the site frame, `x = const` unless tilted, in front of a rover that drives towards it.
 pub struct PlaneWorld {
-    /// The plane's normal, site frame; its texture is painted along the site's x axis.
+    /// The plane's normal, site frame; its texture is projected along the site's x axis.
     pub normal: Vector3,
-    /// Where the plane meets the site's x axis, m.
+    /// Intersection of the plane with the site's x axis, m.
     pub plane_x_m: f64,
     /// The true poses.
     pub true_poses: Vec<Pose>,
@@ -45,9 +44,9 @@ pub struct PlaneWorld {
     pub left: Camera,
     /// The right camera in the rover frame.
     pub right: Camera,
-    /// What goes wrong at each stop.
+    /// Fault of each stop.
     pub troubles: Vec<Trouble>,
-    /// How the two cameras relate.
+    /// Geometric relation of the two cameras.
     pub stereo: StereoGeometry,
 }
 
@@ -73,7 +72,7 @@ impl PlaneWorld {
         }
     }
 
-    /// Where the ray of a pixel meets the plane, site frame.
+    /// Intersection of a pixel's ray with the plane, site frame.
     pub fn plane_point(&self, step: usize, camera: &Camera, pixel: Pixel) -> Option<Point3> {
         let ray = camera.ray(pixel)?;
         let site_from_rover = &self.true_poses[step];

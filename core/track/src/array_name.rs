@@ -1,5 +1,5 @@
-//! The name of an array of a step. Each stage declares its arrays beside its evidence (`impl Record`); the name of an array
-//! that a panel draws by itself is a constant there.
+//! The names of a step's arrays. Each stage declares its arrays beside its evidence (`impl Record`), with a constant
+//! for each array that a panel draws individually.
 //!
 //! The lookup of a name among the declarations is in `trace::arrays`.
 
@@ -17,7 +17,7 @@ impl ArrayName {
         Self(word)
     }
 
-    /// The name as paths and files write it.
+    /// The name, as in paths and files.
     pub const fn word(self) -> &'static str {
         self.0
     }

@@ -1,8 +1,8 @@
 //! The nine stages of one stop of a commanded drive, by name and in running order.
 //!
-//! Stages 1 to 6 are those of this crate; the last three (`core/rover/src/driving/`) decide the next motion and drive it. A
-//! pause of a drive and the record of a stop at which it is paused ([`crate::trace::StepKind::Begun`]) name the first stage that
-//! is not computed.
+//! Stages 1 to 6 are those of this crate; the last three (`core/rover/src/driving/`) decide the next motion and drive
+//! it. A pause of a drive and the record of a stop at which it is paused ([`crate::trace::StepKind::Begun`]) name the
+//! first stage that is not computed.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -21,11 +21,11 @@ pub enum CycleStage {
     Locate,
     /// Stage 5: accepts or rejects the located target.
     Judge,
-    /// Stage 6: the target for the next stop.
+    /// Stage 6: updates the target for the next stop.
     Update,
-    /// Stage 7: the goal that follows from the target.
+    /// Stage 7: computes the goal from the target.
     SetGoal,
-    /// Stage 9: the next motion.
+    /// Stage 9: selects the next motion.
     SelectPath,
     /// Stage 10: drives the motion.
     Drive,
@@ -60,7 +60,7 @@ impl CycleStage {
         }
     }
 
-    /// The stage of a name.
+    /// Returns the stage with this name.
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|stage| stage.word() == name)
     }
@@ -70,7 +70,7 @@ impl CycleStage {
         Self::ALL.into_iter().find(|stage| *stage > self)
     }
 
-    /// The stage before, of the same stop; `None` before `predict`.
+    /// The previous stage of the same stop; `None` before `predict`.
     pub fn previous(self) -> Option<Self> {
         Self::ALL.into_iter().rev().find(|stage| *stage < self)
     }

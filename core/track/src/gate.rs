@@ -77,17 +77,17 @@ impl From<&Gate> for GateRecord {
 pub struct Gate {
     /// The gate's number: 1 to 4 as in K§4.6, from 5 on ours.
     pub criterion: u8,
-    /// Its name.
+    /// The name, unique over all trackers.
     pub name: String,
-    /// Its unit, empty for scores.
+    /// The unit of value, limit and margin; empty for scores.
     pub unit: String,
-    /// The value; null where nothing was found to judge.
+    /// The value; null if the stop gave none.
     pub value: Option<f64>,
     /// The limit.
     pub limit: f64,
     /// Whether the value must be at least the limit; otherwise at most.
     pub at_least: bool,
-    /// How far the value is on the good side of the limit, in its unit.
+    /// Distance of the value from the limit, in its unit: positive on the passing side, null without a value.
     pub margin: Option<f64>,
     /// Whether the gate is passed.
     pub passed: bool,
@@ -97,7 +97,7 @@ pub struct Gate {
 }
 
 impl Gate {
-    /// The same gate with its limit taken from another setting.
+    /// Replaces the name of the setting that gives the limit.
     #[must_use]
     pub(crate) fn with_setting(self, setting: &str) -> Self {
         Self { setting: Some(setting.to_owned()), ..self }

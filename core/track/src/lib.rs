@@ -1,7 +1,7 @@
 //! The trackers: stages 1 to 6 of a stop, from the last target and the pose change to the next target.
 //!
 //! ```text
-//!             ┌──────────────────────── target, as the last stop left it ───────────────────────┐
+//!             ┌──────────────────────── target, updated at the last stop ───────────────────────┐
 //!             ▼                                                                                 │
 //! pose ──► predict ──► point_mast ──► capture ──► locate ─────────────► judge ──► update ───────┘
 //!                                                  │ template: scale_roll → match_template
@@ -13,7 +13,7 @@
 //! Stages are pure: no clock, file or hidden state. Geometry is in `f64`, pixels in `f32`. A lost target is data, never an
 //! error. No type of this crate contains ground truth about the world.
 //!
-//! No type of a crate that knows the ground truth can be named here. The same line compiles in `sightline_world`:
+//! This crate does not depend on any crate with ground truth. This line compiles in `sightline_world`, but not here:
 //!
 //! ```compile_fail
 //! use sightline_world::target_truth::TruthSource;

@@ -1,4 +1,4 @@
-//! Every threshold and parameter that a person may change: unit, default, range and source, said once.
+//! Every threshold and parameter that a user may change, declared once with unit, default, range and source.
 //!
 //! `settings_group!` turns a table into a struct, its defaults and its description, so that the viewer's
 //! form, `--set key=value` and the documentation are the same table. Values marked *(ours)* are not from the
@@ -9,7 +9,7 @@ use utoipa::ToSchema;
 use utoipa::openapi::RefOr;
 use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, OneOfBuilder, Schema, Type};
 
-/// Which values a setting may take.
+/// The values that a setting accepts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Domain {
@@ -24,12 +24,12 @@ pub enum Domain {
 }
 
 impl Domain {
-    /// One of `words`.
+    /// Returns a choice of `words`.
     pub fn choice(words: &[&str]) -> Self {
         Self::Choice(words.iter().map(|&w| w.to_owned()).collect())
     }
 
-    /// Why `value` does not fit, as a clause that can follow the setting's name.
+    /// Returns why `value` is not accepted, as a clause that follows the setting's name; `None` if it is accepted.
     pub fn problem_with(&self, value: &serde_json::Value) -> Option<String> {
         match self {
             Self::Between(low, high) => match value.as_f64() {
@@ -66,15 +66,15 @@ fn value_list_schema() -> Schema {
 pub struct Condition {
     /// The other setting.
     pub key: String,
-    /// Its values.
+    /// The values to compare with.
     #[schema(schema_with = value_list_schema)]
     pub values: Vec<serde_json::Value>,
-    /// Whether it must have none of these values, instead of one of them.
+    /// Whether the other setting must have none of these values, instead of one of them.
     pub excluded: bool,
 }
 
 impl Condition {
-    /// Whether it is met by a value of the other setting.
+    /// Whether a value of the other setting meets the condition.
     pub(crate) fn is_met_by(&self, value: &serde_json::Value) -> bool {
         let equal = |wanted: &serde_json::Value| match (wanted.as_f64(), value.as_f64()) {
             (Some(wanted), Some(value)) => wanted == value,
@@ -93,12 +93,12 @@ impl std::fmt::Display for Condition {
     }
 }
 
-/// What is known about one setting.
+/// The description of one setting.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct SettingInfo {
     /// The name, unique over all groups.
     pub key: String,
-    /// The group it belongs to: `limits` or the locator's name.
+    /// The group of the setting: `limits` or the locator's name.
     pub group: String,
     /// The unit, empty for pure numbers.
     pub unit: String,
@@ -107,17 +107,17 @@ pub struct SettingInfo {
     pub default: serde_json::Value,
     /// The values it may take.
     pub domain: Domain,
-    /// Where the default comes from.
+    /// The source of the default.
     pub source: String,
-    /// What it does, and what one sees when it is wrong.
+    /// The effect, and the symptoms of a wrong value.
     pub help: String,
-    /// The setting has an effect only where one of these is met; always where there is none.
+    /// Conditions of which at least one must be met for the setting to have an effect; empty: it always has one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub only_if: Vec<Condition>,
 }
 
 impl SettingInfo {
-    /// `value` as the setting has it: a whole number may be written as 100.0.
+    /// Converts `value` to the setting's type: a whole number may be written as 100.0.
     pub(crate) fn normalised(&self, value: &serde_json::Value) -> serde_json::Value {
         let whole = value.as_f64().filter(|v| v.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(v));
         match whole {
@@ -126,7 +126,7 @@ impl SettingInfo {
         }
     }
 
-    /// Why `value` cannot be this setting's, as a clause that can follow its name.
+    /// Returns why `value` is not accepted, as a clause that follows the setting's name; `None` if it is accepted.
     pub fn problem_with(&self, value: &serde_json::Value) -> Option<String> {
         let is_broken = self.default.is_u64() && !value.is_u64();
         self.domain
@@ -134,7 +134,7 @@ impl SettingInfo {
             .or_else(|| is_broken.then(|| format!("must be a whole number, not {value}")))
     }
 
-    /// Whether the setting has an effect beside the values of the others in `table`.
+    /// Whether the setting has an effect, given the values of the other settings in `table`.
     pub fn has_effect(&self, table: &[Self], value: &dyn Fn(&Self) -> serde_json::Value) -> bool {
         let is_met = |condition: &Condition| {
             let other = table.iter().find(|other| other.key == condition.key);
@@ -170,8 +170,8 @@ impl SettingInfo {
 
 /// Declares a group of settings: the struct, its defaults, and `table()` that describes it.
 ///
-/// A setting that matters under some values of another one ends with `, if other = "word" | "word"` or `, unless other = 0.0`;
-/// several of these are alternatives.
+/// A setting that has an effect only for some values of another one ends with `, if other = "word" | "word"` or `,
+/// unless other = 0.0`; several of these are alternatives.
 #[macro_export]
 macro_rules! settings_group {
     ($(#[$meta:meta])* $name:ident as $group:literal {

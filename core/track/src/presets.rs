@@ -1,7 +1,7 @@
-//! Named configurations of the tracker: the eight of the paper's comparison and those beside them (R129, R216–R225).
+//! Named configurations of the tracker: the eight of the paper's comparison, and others (R129, R216–R225).
 //!
-//! A preset is a list of changes to the default settings and nothing else; whatever it leaves out keeps its default.
-//! What the papers flew comes first, so that a default of ours never slips into a configuration that is called theirs:
+//! A preset is a list of changes to the default settings; every other setting keeps its default. The changes back to
+//! the published method are applied first, so that no default of ours enters a configuration named after the papers:
 //! the presets named `ncc…` all begin with [`AS_PUBLISHED`].
 
 use crate::settings::{Changes, Settings, TrackerKind, parse_assignment};
@@ -10,17 +10,17 @@ use sightline_geometry::error::{Error, Result};
 /// A named configuration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Preset {
-    /// Its name: words joined by hyphens.
+    /// The name: words joined by hyphens.
     pub name: &'static str,
-    /// One sentence that says what it does, with its source.
+    /// One sentence on the method, with its source.
     pub description: &'static str,
-    /// What it begins with, as others do.
+    /// Changes shared with other presets, applied first.
     base: &'static [&'static str],
-    /// What it changes, as `key=value`.
+    /// Its own changes, as `key=value`.
     changes: &'static [&'static str],
 }
 
-/// What the paper leaves out and the defaults switch on (K§4.3, K§4.4).
+/// Switches off the defaults that the paper does not have (K§4.3, K§4.4).
 pub const AS_PUBLISHED: [&str; 5] = [
     "surface_warp=false",
     "focus_px=0",
@@ -41,7 +41,7 @@ const fn ours(name: &'static str, description: &'static str, changes: &'static [
     Preset { name, description, base: &[], changes }
 }
 
-/// Features weighed by range, over the last three good stops.
+/// Features weighted by range, over the last three good stops.
 const FEATURES: [&str; 6] = [
     "sift_contrast_min=0.015",
     "n_retry=100",
@@ -51,7 +51,7 @@ const FEATURES: [&str; 6] = [
     "feature_common_px=0.65",
 ];
 
-/// Features as the K9 rover had them (D§2).
+/// Features as on the K9 rover (D§2).
 const FEATURES_PAPER: [&str; 8] = [
     "sift_contrast_min=0.015",
     "n_retry=100",
@@ -199,15 +199,15 @@ pub const PRESETS: &[Preset] = &[
 ];
 
 impl Preset {
-    /// What it changes, by setting.
+    /// Returns the changes, by setting.
     ///
     /// # Errors
-    /// None for a preset of [`PRESETS`]; a test holds that.
+    /// None for a preset of [`PRESETS`]; a test checks that.
     pub fn changes(&self) -> Result<Changes> {
         self.base.iter().chain(self.changes).map(|text| parse_assignment(text)).collect()
     }
 
-    /// The settings it stands for.
+    /// Returns the settings of the preset.
     ///
     /// # Errors
     /// As [`Preset::changes`].
@@ -216,10 +216,10 @@ impl Preset {
     }
 }
 
-/// The preset of that name.
+/// Returns the preset with this name.
 ///
 /// # Errors
-/// A name that is not listed; the sentence lists those that are.
+/// If the name is not listed; the message lists the known names.
 pub fn preset(name: &str) -> Result<&'static Preset> {
     PRESETS.iter().find(|preset| preset.name == name).ok_or_else(|| {
         let known = PRESETS.iter().map(|preset| preset.name).collect::<Vec<_>>().join(", ");

@@ -1,11 +1,12 @@
-//! The stages of a step in running order, each with its question and the way from the step to its evidence.
+//! The stages of a step in running order, each with its question and the accessor of its evidence.
 //!
 //! ```text
 //! step ─► predict ─► point_mast ─► capture ─► the steps of locate ─► locate ─► judge ─► update
 //! ```
-//! The quantities, arrays and gates are declared beside each evidence type (`impl Record`). `session::records` adds the row
-//! of a step and its comparison with the truth; tables, comparisons, expressions, logs and pages are views of that list. A
-//! quantity or an array is added in one file, a step of `locate` in its own file and the evidence of its tracker.
+//! The quantities, arrays and gates are declared beside each evidence type (`impl Record`). `session::records` adds
+//! the row of a step and its comparison with the truth; tables, comparisons, expressions, logs and pages are views of
+//! that list. A quantity or an array is added in one file; a step of `locate` needs its own file and a field in the
+//! evidence of its tracker.
 
 use std::sync::LazyLock;
 
@@ -48,7 +49,7 @@ fn evidence(trace: &StepTrace) -> Option<&Evidence> {
     Some(&trace.located()?.evidence)
 }
 
-/// The stages that a user sees of a tracker, in running order: the six of every tracker, with its own steps after `locate`.
+/// The stages of a tracker shown to a user, in running order: the six of every tracker, with its own steps after `locate`.
 pub fn stages_of(tracker: TrackerKind) -> impl Iterator<Item = &'static str> {
     let before = ["predict", "point_mast", "capture", "locate"].into_iter();
     before.chain(locate::steps(tracker).iter().copied()).chain(["judge", "update"])
@@ -59,7 +60,7 @@ pub(crate) fn arrays() -> impl Iterator<Item = &'static ArrayDecl> {
     STAGES.iter().flat_map(|stage| &stage.schema().arrays)
 }
 
-/// The array of a name, where its stage made it at this step.
+/// Returns the array with this name; `None` if its stage did not make it at this step.
 pub fn array<'a>(trace: &'a StepTrace, name: &str) -> Option<ArrayView<'a>> {
     STAGES.iter().find_map(|stage| stage.array(trace, name))
 }

@@ -12,21 +12,21 @@ use crate::locate::shape_tracker::settings::ShapeTrackerSettings;
 use crate::locate::template::settings::TemplateSettings;
 use sightline_geometry::error::{Error, Result};
 
-/// Changes to settings by name, as a person writes them.
+/// Changes to settings by name, as a user writes them.
 pub type Changes = BTreeMap<String, Value>;
 
-/// Which locator finds the target.
+/// The locator of the target.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TrackerKind {
     /// Normalised correlation of a scaled and rolled template (Kim et al. 2009).
     #[default]
     Template,
-    /// The motion of the whole scene by its features (Deans et al. 2005).
+    /// The rigid motion of the whole scene, from its features (Deans et al. 2005).
     Features,
     /// The shape of the target's surroundings (Deans et al. 2005).
     Shape,
-    /// Features on the way, the shape at the end (Deans et al. 2005, D§4).
+    /// Features during the drive, the shape at the end (Deans et al. 2005, D§4).
     Combined,
 }
 
@@ -34,7 +34,7 @@ impl TrackerKind {
     /// All kinds.
     pub const ALL: [Self; 4] = [Self::Template, Self::Features, Self::Shape, Self::Combined];
 
-    /// The kind's word.
+    /// The name, as in the settings.
     pub const fn word(self) -> &'static str {
         match self {
             Self::Template => "template",
@@ -44,7 +44,7 @@ impl TrackerKind {
         }
     }
 
-    /// How it finds the target, in a few words.
+    /// The method in a few words.
     pub const fn about(self) -> &'static str {
         match self {
             Self::Template => "Normalised correlation of a scaled and rolled template",
@@ -64,12 +64,12 @@ impl TrackerKind {
         }
     }
 
-    /// Whether features are followed on the way.
+    /// Whether features are tracked during the drive.
     pub const fn follows_features(self) -> bool {
         matches!(self, Self::Features | Self::Combined)
     }
 
-    /// Whether the shape is asked at some stop.
+    /// Whether the shape is registered at some stop.
     pub const fn asks_shape(self) -> bool {
         matches!(self, Self::Shape | Self::Combined)
     }
@@ -91,7 +91,7 @@ pub struct Settings {
     pub shape: ShapeTrackerSettings,
 }
 
-/// The name of the setting that chooses the locator; it is a group of its own.
+/// The name of the setting that chooses the locator; it is its own group.
 const TRACKER: &str = "tracker";
 
 impl Settings {
@@ -147,7 +147,7 @@ impl Settings {
         place.get(key).cloned()
     }
 
-    /// The settings among `changes` that have no effect beside the others, each with the condition under which it has.
+    /// The settings among `changes` that have no effect, given the others, each with the condition under which it has one.
     pub fn without_effect(&self, changes: &Changes) -> Vec<(String, String)> {
         if changes.is_empty() {
             return Vec::new();
@@ -164,7 +164,7 @@ impl Settings {
         self.changes_from(&Self::default())
     }
 
-    /// The settings that differ from those of `before`, by name: what leads from there to here.
+    /// The settings that differ from those of `before`, by name: the changes from `before` to `self`.
     pub fn changes_from(&self, before: &Self) -> Changes {
         if self == before {
             return Changes::new();
@@ -186,10 +186,10 @@ impl SettingInfo {
     }
 }
 
-/// Reads `key=value`; the value is JSON where it can be (numbers, `true`), else a word.
+/// Parses `key=value`; the value is JSON if possible (numbers, `true`), otherwise a string.
 ///
 /// # Errors
-/// [`Error::Setting`] when there is no `=`.
+/// [`Error::Setting`] if there is no `=`.
 pub fn parse_assignment(text: &str) -> Result<(String, Value)> {
     let (key, value) = text
         .split_once('=')
@@ -203,10 +203,10 @@ fn join_keys(changes: &Changes) -> String {
     changes.keys().cloned().collect::<Vec<_>>().join(", ")
 }
 
-/// Every change, as its setting has it, with what the table says of the setting.
+/// Returns every change with its normalised value and the description of its setting.
 ///
 /// # Errors
-/// [`Error::Setting`] naming the first that the table does not know or whose value does not fit.
+/// [`Error::Setting`] naming the first unknown setting or invalid value.
 pub fn checked<'a>(changes: &'a Changes, table: &'a [SettingInfo]) -> Result<Vec<(&'a SettingInfo, Value)>> {
     let check = |(key, value): (&'a String, &'a Value)| {
         let info = table.iter().find(|info| info.key == *key).ok_or_else(|| unknown(key, table))?;
@@ -309,7 +309,7 @@ mod tests {
         let idle = without_effect(&[("sdog_ratio", json!(2.0)), ("ncc_min", json!(0.6))]);
         assert_eq!(idle, [("sdog_ratio".to_owned(), "measure = sdog".to_owned())]);
         assert!(without_effect(&[("sdog_ratio", json!(2.0)), ("measure", json!("sdog"))]).is_empty());
-        // The measure itself has no effect under a descent, so that its parameters have none.
+        // The measure has no effect with a descent, so that its parameters have none.
         let changes =
             [("sdog_ratio", json!(2.0)), ("measure", json!("sdog")), ("first_stage", json!("klt_affine"))];
         let keys: Vec<_> = without_effect(&changes).into_iter().map(|(key, _)| key).collect();
@@ -320,7 +320,7 @@ mod tests {
         assert_eq!(idle[0].1, "first_stage = klt_translation or klt_affine, or refine = affine");
         assert!(without_effect(&[("height_scale_m", json!(0.1)), ("height_weight", json!(0.2))]).is_empty());
         assert_eq!(without_effect(&[("height_scale_m", json!(0.1))])[0].1, "height_weight ≠ 0.0");
-        // A group of another tracker has none.
+        // A setting of another tracker has no effect.
         let idle = without_effect(&[("bootstrap_sets", json!(50))]);
         assert_eq!(idle[0].1, "tracker = features or combined");
         assert!(without_effect(&[("bootstrap_sets", json!(50)), ("tracker", json!("combined"))]).is_empty());

@@ -1,8 +1,8 @@
-//! The target: one surface point that is to be found again, with the memory of its tracker.
+//! The target: one surface point to be tracked, with the memory of its tracker.
 //!
-//! A target is designated by a sub-pixel position in the left image of a stop (R16); its 3-D position comes
-//! from point stereo there. From then on every accepted update renews position, covariance and memory;
-//! the initial position is kept unchanged for the gates of `judge` (R19, R84).
+//! A target is designated by a sub-pixel position in the left image of a stop (R16); its 3-D position is measured
+//! there by point stereo. From then on every accepted update renews position, covariance and memory; the initial
+//! position is kept unchanged for the gates of `judge` (R19, R84).
 
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
@@ -14,7 +14,7 @@ use sightline_geometry::frames::{Pixel, Point3};
 
 pub use crate::verdict::TrackingState;
 
-/// How a person names a target: a position in the left image of a stop.
+/// The designation of a target: a position in the left image of a stop.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Designation {
@@ -22,7 +22,7 @@ pub struct Designation {
     pub step: usize,
     /// The position, px.
     pub pixel: Pixel,
-    /// The pair of the stop in which the target is tracked; left out: the main pair.
+    /// The camera pair in which the target is tracked; if omitted, the main pair.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<CameraName>,
 }
@@ -34,10 +34,10 @@ impl Designation {
     }
 }
 
-/// The target as one stop leaves it to the next.
+/// The target as one stop passes it to the next.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Target {
-    /// How it was designated.
+    /// The designation.
     pub designation: Designation,
     /// The stop in whose rover frame the position is given.
     pub step: usize,
@@ -58,7 +58,7 @@ pub struct Target {
     pub last_distance_m: f64,
     /// Distance driven since the last accepted update, m (`L_step`).
     pub travelled_since_update_m: f64,
-    /// What its tracker remembers of the stops so far.
+    /// The memory of its tracker.
     #[schema(value_type = Object)]
     pub memory: TrackerMemory,
 }

@@ -1,7 +1,8 @@
-//! What one step saw and decided: the return values of the six stages, side by side.
+//! The results of one step: the return values of the six stages, side by side.
 //!
-//! The debugger is a view of this record. The fields bear the stages' names, those of [`StepKind`] too; arrays are fetched
-//! one by one under the names of [`ArrayName`]. `session::step` adds the comparison with the truth and the serialised form.
+//! The debugger is a view of this record. The fields, also those of [`StepKind`], have the names of the stages;
+//! arrays are fetched one by one by [`ArrayName`]. `session::step` adds the comparison with the truth and the
+//! serialised form.
 
 mod arrays;
 mod memory;
@@ -40,7 +41,7 @@ pub struct StepTrace {
 #[derive(Clone, Debug, PartialEq)]
 #[allow(clippy::large_enum_variant, reason = "nearly every step is tracked: the others waste little")]
 pub enum StepKind {
-    /// The stop at which a person designated the target: nothing is predicted or judged.
+    /// The stop at which a user designated the target: nothing is predicted or judged.
     Designation {
         /// Stage 3.
         capture: Capture,
@@ -125,7 +126,7 @@ impl StepTrace {
         })
     }
 
-    /// Whether visual odometry ran alone at the stop: the tracker did not look for the target.
+    /// Whether visual odometry ran alone at the stop, so that the tracker did not search for the target.
     pub const fn is_odometry_alone(&self) -> bool {
         matches!(self.kind, StepKind::OdometryAlone { .. })
     }
@@ -135,7 +136,7 @@ impl StepTrace {
         matches!(self.kind, StepKind::OutOfView { .. })
     }
 
-    /// Why the tracker did not look for the target, which is no failure; `None` where it did.
+    /// Why the tracker did not search for the target, which is no failure; `None` if it did.
     pub const fn why_not_searched(&self) -> Option<&'static str> {
         match self.kind {
             StepKind::OdometryAlone { .. } => Some(ODOMETRY_ALONE),
@@ -162,7 +163,7 @@ impl StepTrace {
         if self.is_begun() { None } else { Some(&self.update) }
     }
 
-    /// Stage 3; `None` where the stop's files are damaged, nothing was searched, or the drive is paused before it.
+    /// Stage 3; `None` if the stop's files are damaged, no search was made, or the drive is paused before it.
     pub const fn capture(&self) -> Option<&Capture> {
         match &self.kind {
             StepKind::Designation { capture, .. } | StepKind::Tracked { capture, .. } => Some(capture),
@@ -171,7 +172,7 @@ impl StepTrace {
         }
     }
 
-    /// The same, to be changed.
+    /// Mutable result of stage 3; see [`StepTrace::capture`].
     pub const fn capture_mut(&mut self) -> Option<&mut Capture> {
         match &mut self.kind {
             StepKind::Designation { capture, .. } | StepKind::Tracked { capture, .. } => Some(capture),
@@ -180,7 +181,7 @@ impl StepTrace {
         }
     }
 
-    /// Stage 4; `None` where the stop's files are damaged, nothing was searched, or the drive is paused before it.
+    /// Stage 4; `None` if the stop's files are damaged, no search was made, or the drive is paused before it.
     pub const fn located(&self) -> Option<&Located> {
         match &self.kind {
             StepKind::Designation { locate, .. } | StepKind::Tracked { locate, .. } => Some(locate),
@@ -189,7 +190,7 @@ impl StepTrace {
         }
     }
 
-    /// The same, to be changed.
+    /// Mutable result of stage 4; see [`StepTrace::located`].
     pub const fn located_mut(&mut self) -> Option<&mut Located> {
         match &mut self.kind {
             StepKind::Designation { locate, .. } | StepKind::Tracked { locate, .. } => Some(locate),
@@ -198,7 +199,7 @@ impl StepTrace {
         }
     }
 
-    /// Stage 5; `None` at the designation and as [`StepTrace::capture`].
+    /// Stage 5; `None` at the designation, and in the cases of [`StepTrace::capture`].
     pub const fn verdict(&self) -> Option<&Verdict> {
         match &self.kind {
             StepKind::Tracked { judge, .. } => Some(judge),
@@ -210,7 +211,7 @@ impl StepTrace {
         }
     }
 
-    /// The damage of the stop's files, as one sentence.
+    /// The damage of the stop's files, or the missing pair, as one sentence; `None` without a fault.
     pub fn fault(&self) -> Option<&str> {
         match &self.kind {
             StepKind::Damaged { fault, .. } => Some(fault),
@@ -218,7 +219,7 @@ impl StepTrace {
         }
     }
 
-    /// Why the step lacks stages: the damage of the stop's files, the pause of the drive, or a stop at which nothing was searched;
+    /// Why the step lacks stages: the damage of the stop's files, the pause of the drive, or a stop without a search;
     /// `None` for a complete step.
     pub fn why_incomplete(&self) -> Option<String> {
         let paused =
@@ -227,17 +228,17 @@ impl StepTrace {
         self.fault().map(str::to_owned).or_else(|| self.paused_before().map(paused)).or(not_searched)
     }
 
-    /// The evidence of the template locator, where something was located.
+    /// The evidence of the template locator; `None` without stage 4.
     pub fn template(&self) -> Option<&TemplateEvidence> {
         self.located().and_then(|located| located.evidence.template())
     }
 
-    /// The evidence of the feature locator, where something was located.
+    /// The evidence of the feature locator; `None` without stage 4, or if the tracker does not use features.
     pub fn features(&self) -> Option<&FeatureEvidence> {
         self.located().and_then(|located| located.evidence.features())
     }
 
-    /// The evidence of the shape tracker, where something was located.
+    /// The evidence of the shape tracker; `None` without stage 4, or if the tracker does not use the shape.
     pub fn shape(&self) -> Option<&ShapeEvidence> {
         self.located().and_then(|located| located.evidence.shape())
     }
@@ -247,7 +248,7 @@ impl StepTrace {
         (self.update.target.position_in_rover - self.point_mast.left.model.centre()).norm()
     }
 
-    /// The paper's budget at this step's range, for tracking that drifts by half a pixel of the first image (R40).
+    /// The paper's error budget at this step's range, for tracking that drifts by half a pixel of the first image (R40).
     pub fn budget(&self) -> Option<ErrorBudget> {
         let pointing = &self.point_mast;
         let pixel = pointing.predicted_left.unwrap_or_else(|| pointing.left.centre_pixel());

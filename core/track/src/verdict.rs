@@ -10,19 +10,19 @@ use crate::gate::Gate;
 pub struct Verdict {
     /// The gates, in the order in which the tracker lists them.
     pub gates: Vec<Gate>,
-    /// Whether all of them are met.
+    /// Whether all gates are passed.
     pub good: bool,
-    /// Whether the update is used: good, and the target had not failed before.
+    /// Whether the update is used: it is good, and the target had not failed before.
     pub accepted: bool,
-    /// Why not, as one sentence.
+    /// Why the update is not good, as one sentence; null if it is.
     pub reason: Option<String>,
     /// The state before this update.
     pub state_before: TrackingState,
-    /// The state after it.
+    /// The state after this update.
     pub state: TrackingState,
 }
 
-/// Where tracking stands (Kim09 §4.6): the words of the house, of which `tracking` is the papers' "normal".
+/// The tracking state (Kim09 §4.6); `tracking` is the papers' "normal".
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "state", rename_all = "snake_case")]
 pub enum TrackingState {
@@ -31,7 +31,7 @@ pub enum TrackingState {
     Cleared,
     /// The last update was good.
     Tracking,
-    /// This many updates were bad, and a retry is allowed.
+    /// This many consecutive updates were bad, and a retry is allowed.
     Lost {
         /// Bad updates in a row, the detecting one included.
         count: u32,
@@ -41,7 +41,7 @@ pub enum TrackingState {
 }
 
 impl TrackingState {
-    /// The state's word.
+    /// The name, as in records.
     pub const fn word(self) -> &'static str {
         match self {
             Self::Cleared => "cleared",
@@ -51,7 +51,7 @@ impl TrackingState {
         }
     }
 
-    /// Whether the target counts as lost.
+    /// Whether the target is lost or failed.
     pub const fn is_lost(self) -> bool {
         matches!(self, Self::Lost { .. } | Self::Failed)
     }

@@ -1,10 +1,11 @@
-//! Corners: pixels around which the image changes in every direction (Shi & Tomasi 1994; R217).
+//! Corner detection: pixels around which the image changes in every direction (Shi & Tomasi 1994; R217).
 //!
 //! ```text
 //! G = mean over (2h + 1)² px of ∇I ∇Iᵀ          strength = smaller eigenvalue of G
 //! ```
-//! Gradients are central differences. A corner is a local maximum of the strength. The best one of every square cell of the
-//! image comes first, so that corners spread; then the others by strength, each at least a distance away from those before.
+//! Gradients are central differences. A corner is a local maximum of the strength. The best one of every square cell of
+//! the image comes first, so that corners are spread; then the others by strength, each at least a minimum distance from
+//! the previous ones.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -16,14 +17,14 @@ use pulp::Arch;
 use crate::image::GrayImage;
 use sightline_geometry::frames::Pixel;
 
-/// How corners are found.
+/// Settings of the corner detector.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CornerSettings {
-    /// Half of the window of the structure tensor, px.
+    /// Half side of the window of the structure tensor, px.
     pub half_px: u32,
-    /// Most corners.
+    /// Largest number of corners.
     pub count: usize,
-    /// Least distance of two corners, px.
+    /// Least distance between two corners, px.
     pub spacing_px: f64,
     /// Width of the border without corners, px.
     pub border_px: u32,
@@ -34,18 +35,18 @@ pub struct CornerSettings {
 /// A corner.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Corner {
-    /// Its place: a whole pixel.
+    /// Position: a whole pixel.
     pub pixel: Pixel,
     /// Smaller eigenvalue of the structure tensor, (fraction of full scale per px)².
     pub strength: f32,
 }
 
-/// The corners of an image, those that spread over the cells first.
+/// Detects the corners of an image, in the order of selection: the best of each cell, then the others.
 ///
 /// A pixel whose window touches an invalid pixel is no corner.
 pub fn corners(image: &GrayImage, settings: &CornerSettings) -> Vec<Corner> {
     let [width, height] = [image.width() as usize, image.height() as usize];
-    // One more pixel than the window, for the neighbours with which a maximum is compared and for the gradient.
+    // Two more pixels than the window: the gradient and the neighbours of a maximum.
     let border = (settings.border_px as usize).max(settings.half_px as usize + 2);
     if width <= 2 * border || height <= 2 * border || settings.count == 0 {
         return Vec::new();
@@ -59,7 +60,7 @@ pub fn corners(image: &GrayImage, settings: &CornerSettings) -> Vec<Corner> {
     for y in border..height - border {
         for x in border..width - border {
             let strength = strengths[y * width + x];
-            // Comparisons with an invalid strength are false.
+            // Comparisons with NaN are false.
             if strength >= settings.strength_min && is_maximum(&strengths, width, x, y) {
                 maxima.push(Corner { pixel: Pixel::new(x as f64, y as f64), strength });
             }
@@ -69,7 +70,7 @@ pub fn corners(image: &GrayImage, settings: &CornerSettings) -> Vec<Corner> {
     spread(&maxima, [width, height], settings)
 }
 
-/// Whether no neighbour is stronger; of equal ones the first in reading order counts.
+/// Returns whether no neighbour is stronger; of equal ones the first in reading order counts.
 fn is_maximum(strengths: &[f32], width: usize, x: usize, y: usize) -> bool {
     let at = y * width + x;
     let before = [at - width - 1, at - width, at - width + 1, at - 1];
@@ -78,7 +79,7 @@ fn is_maximum(strengths: &[f32], width: usize, x: usize, y: usize) -> bool {
         && after.iter().all(|&i| strengths[i] <= strengths[at])
 }
 
-/// The best of each cell, then the best of the rest, none nearer than allowed to one before it.
+/// Selects the best of each cell, then the best of the rest, each at least `spacing_px` from the previous ones.
 fn spread(maxima: &[Corner], [width, height]: [usize; 2], settings: &CornerSettings) -> Vec<Corner> {
     let cell_px = ((width * height) as f64 / settings.count as f64).sqrt().max(1.0);
     let columns = (width as f64 / cell_px).ceil() as usize;
@@ -97,7 +98,7 @@ fn spread(maxima: &[Corner], [width, height]: [usize; 2], settings: &CornerSetti
     kept.corners
 }
 
-/// Corners that are apart from each other, by cells as wide as the least distance.
+/// Corners with a minimum distance, in a grid of cells of that width.
 struct Kept {
     corners: Vec<Corner>,
     cells: Vec<Vec<usize>>,
@@ -128,7 +129,7 @@ impl Kept {
     }
 }
 
-/// The smaller eigenvalue at every pixel; not a number where the window leaves the image or touches an invalid pixel.
+/// The smaller eigenvalue at every pixel; NaN where the window leaves the image or touches an invalid pixel.
 #[inline(always)]
 fn strengths(image: &GrayImage, half: usize) -> Vec<f32> {
     let [width, height] = [image.width() as usize, image.height() as usize];
@@ -136,8 +137,8 @@ fn strengths(image: &GrayImage, half: usize) -> Vec<f32> {
     let side = 2 * half + 1;
     let scale = 1.0 / (side * side) as f32;
     let mut strengths = vec![f32::NAN; width * height];
-    // Sums of the products over the columns of a window, for the rows of one window at a time: added to below and taken from
-    // above would let errors and invalid pixels stay, so that each row of windows adds its own rows of products.
+    // Sums of the products over the columns of a window, for the rows of one window at a time. A running sum would
+    // accumulate errors and keep NaN of invalid pixels, so each row of windows sums its own rows of products.
     let empty = || [vec![f32::NAN; width], vec![f32::NAN; width], vec![f32::NAN; width]];
     let mut rows: Vec<[Vec<f32>; 3]> = (0..side).map(|_| empty()).collect();
     let (mut products, mut sums) = (empty(), empty());
@@ -146,7 +147,7 @@ fn strengths(image: &GrayImage, half: usize) -> Vec<f32> {
         for (sum, product) in rows[y % side].iter_mut().zip(&products) {
             windowed(product, half, sum);
         }
-        // The middle of the window whose last row this is.
+        // The centre of the window whose last row this is.
         let Some(middle) = y.checked_sub(half).filter(|middle| *middle > half) else { continue };
         sums.iter_mut().for_each(|sum| sum.fill(0.0));
         for row in (y + 1 - side..=y).map(|y| &rows[y % side]) {
@@ -166,7 +167,7 @@ fn strengths(image: &GrayImage, half: usize) -> Vec<f32> {
     strengths
 }
 
-/// The products of the gradients in a row: along x twice, mixed, along y twice; not a number at the border.
+/// The products of the gradients in a row: xx, xy, yy; NaN at the border.
 #[inline(always)]
 fn row_products(pixels: &[f32], [width, height]: [usize; 2], y: usize, products: &mut [Vec<f32>; 3]) {
     if y == 0 || y + 1 >= height || width < 3 {
@@ -185,12 +186,12 @@ fn row_products(pixels: &[f32], [width, height]: [usize; 2], y: usize, products:
     }
 }
 
-/// Sums over the 2·half + 1 values around each; not a number where one is missing.
+/// Sums over the 2·half + 1 values around each; NaN where one is missing.
 #[inline(always)]
 fn windowed(values: &[f32], half: usize, sums: &mut [f32]) {
     let inner = &mut sums[half..values.len() - half];
     inner.fill(0.0);
-    // One value of all windows after another: the additions of neighbouring windows go side by side.
+    // One value of all windows at a time, so that the additions of neighbouring windows are vectorised.
     for shift in 0..=2 * half {
         for (sum, value) in inner.iter_mut().zip(&values[shift..]) {
             *sum += value;
@@ -215,7 +216,7 @@ mod tests {
     #[test]
     fn corners_of_squares_are_found_and_their_edges_are_not() {
         let found = corners(&squares(120), &SETTINGS);
-        // Each way nine edges beyond the border.
+        // Nine edges in each direction inside the border.
         assert_eq!(found.len(), 81, "{found:?}");
         for corner in &found {
             let off = |v: f64| {

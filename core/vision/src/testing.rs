@@ -1,10 +1,10 @@
-//! The reference image and numbers of `tests/reference/measures_reference.py`.
+//! Reference image and numbers of `tests/reference/measures_reference.py`.
 
 use image::Luma;
 
 use crate::image::GrayImage;
 
-/// The image of `tests/reference/measures_reference.py`: 16 waves of 7 to 48 px, seen through `warp`.
+/// The image of `tests/reference/measures_reference.py`: 16 waves of 7 to 48 px, sampled through `warp`.
 pub(crate) fn reference_image(warp: impl Fn(f64, f64) -> (f64, f64), gain: f64, level: f64) -> GrayImage {
     GrayImage::from_fn(96, 80, |x, y| {
         let (x, y) = warp(f64::from(x), f64::from(y));
@@ -18,7 +18,7 @@ pub(crate) fn reference_image(warp: impl Fn(f64, f64) -> (f64, f64), gain: f64, 
     })
 }
 
-/// The numbers that `tests/reference/measures_reference.py` wrote.
+/// The numbers written by `tests/reference/measures_reference.py`.
 pub(crate) fn reference_numbers() -> serde_json::Value {
     let text = include_str!("../../../tests/reference/measures_reference.json");
     serde_json::from_str(text).unwrap()

@@ -20,13 +20,13 @@ use sightline_geometry::error::Result;
 use sightline_geometry::frames::{Point3, Ray, Vector3};
 
 impl World {
-    /// Builds the world of a scenario at the start of the drive, without the rover and what is in its way; the
-    /// scenario is taken as valid ([`Scenario::validate`]).
+    /// Builds the world of a scenario at the start of the drive, without the rover and occluders. The scenario must
+    /// be valid ([`Scenario::validate`]).
     pub fn new(scenario: &Scenario) -> Self {
         Self::new_until(scenario, Cancel::default()).unwrap_or_else(|_| unreachable!("nobody cancels"))
     }
 
-    /// [`World::new`], which ends soon after `cancel` is requested.
+    /// [`World::new`], cancellable.
     ///
     /// # Errors
     /// [`sightline_geometry::error::Error::Cancelled`].

@@ -1,11 +1,12 @@
-//! Which rocks a ray can meet at all: a tree for any ray and for a tile, a grid for the rays to the sun, a cone for a tile.
+//! Culling of rocks: a tree for single rays and for the cone of an image tile, a grid for the rays to the sun.
 //!
-//! All three only leave out rocks whose bounding sphere the ray misses, so results never depend on them.
+//! All three only exclude rocks whose bounding sphere the ray misses, so results never depend on them.
 //!
-//! * [`Tree`]: bounding boxes of spheres, split at the median of the longest axis. For a cone, the sphere around a box is tested.
-//! * [`SunGrid`]: all rays to the sun are parallel. The rocks' spheres are projected along them on a plane,
-//!   whose cells list the discs that touch them: a shadow ray looks into one cell.
-//! * [`in_cone`]: a tile of the image sees a narrow cone; a sphere of radius r at distance |v| is in it when
+//! * [`Tree`]: bounding boxes of spheres, split at the median of the longest axis; a cone is tested with the sphere
+//!   around a box.
+//! * [`SunGrid`]: all rays to the sun are parallel. The rocks' bounding spheres are projected along them onto a plane,
+//!   and each grid cell lists the discs that overlap it: a shadow ray tests one cell.
+//! * [`in_cone`]: the rays of an image tile fill a narrow cone. A sphere of radius r at distance |v| is in it when
 //!   the angle from the cone's axis is at most the cone's half angle plus asin(r/|v|), below 180° in sum.
 //!
 //! Frames: site, m. Sources: ours.
@@ -72,9 +73,9 @@ impl Tree {
         self.split(rocks, child + 1);
     }
 
-    /// Calls `visit` with every rock whose box the ray meets before the distance that `visit` returns, m.
+    /// Calls `visit` with every rock whose bounding box the ray meets nearer than the limit.
     ///
-    /// `visit` gets the rock's index and returns how far the ray still matters.
+    /// The limit is `to_m` at first, then the last value that `visit` returned, m along the ray.
     pub(crate) fn along(&self, ray: &Ray, mut to_m: f64, mut visit: impl FnMut(usize) -> f64) {
         let mut open = [0usize; 64];
         let mut depth = usize::from(!self.nodes.is_empty());
@@ -96,7 +97,7 @@ impl Tree {
         }
     }
 
-    /// Calls `visit` with the index of every rock that a cone of rays can meet, and of some more.
+    /// Calls `visit` with the index of every rock that a ray of the cone can meet, and of some others (conservative).
     pub(crate) fn in_cone(&self, cone: &Cone, mut visit: impl FnMut(usize)) {
         let mut open = Vec::from_iter(self.nodes.first());
         while let Some(node) = open.pop() {
@@ -114,7 +115,7 @@ impl Tree {
 }
 
 impl Node {
-    /// The middle of the box, and the radius of the sphere around it, m.
+    /// Centre of the box and radius of its circumscribed sphere, m.
     fn sphere(&self) -> (Point3, f64) {
         let middle = Point3::from([0, 1, 2].map(|k| 0.5 * (self.low[k] + self.high[k])));
         (middle, (Point3::from(self.high) - middle).norm())
@@ -139,7 +140,7 @@ fn meets_box(node: &Node, ray: &Ray, to_m: f64) -> bool {
     enter_m <= leave_m
 }
 
-/// The rocks by where the sun's rays meet them.
+/// Grid over the plane across the sun's rays, with the rocks that overlap each cell.
 #[derive(Clone, Debug)]
 pub(crate) struct SunGrid {
     /// Unit direction towards the sun, site frame.
@@ -147,7 +148,7 @@ pub(crate) struct SunGrid {
     across: [Vector3; 2],
     low_m: [f64; 2],
     cells: [usize; 2],
-    /// Where the list of each cell starts in `rocks`; one more than there are cells.
+    /// Offset of each cell's list in `rocks`; one more entry than there are cells.
     starts: Vec<u32>,
     rocks: Vec<u32>,
 }
@@ -199,8 +200,8 @@ impl SunGrid {
         Self { to_sun: *sun_direction, across, low_m, cells, starts, rocks: lists.concat() }
     }
 
-    /// Lists in `found` the rocks whose shadow may fall within `radius_m` of a point; false where the grid has too many
-    /// cells there.
+    /// Collects into `found` the rocks whose shadow may fall within `radius_m` of a point. Returns false if the
+    /// region covers more than two cells along an axis.
     pub(crate) fn near(&self, point: &Point3, radius_m: f64, rocks: &[Rock], found: &mut Vec<u32>) -> bool {
         found.clear();
         if self.rocks.is_empty() {
@@ -228,7 +229,7 @@ impl SunGrid {
                     let off_m = rock.centre - point;
                     let towards_m = off_m.dot(&self.to_sun);
                     let aside_m2 = off_m.norm_squared() - towards_m * towards_m;
-                    // A rock behind the point shades nothing there.
+                    // A rock behind the point casts no shadow on it.
                     if towards_m > -reach_m && aside_m2 <= reach_m * reach_m && !found.contains(&index) {
                         found.push(index);
                     }
@@ -238,7 +239,7 @@ impl SunGrid {
         true
     }
 
-    /// The rocks that may stand between a point and the sun.
+    /// The rocks that may occlude the sun at a point.
     #[inline(always)]
     pub(crate) fn towards_sun(&self, point: &Point3) -> &[u32] {
         let mut cell = [0usize; 2];
@@ -254,23 +255,24 @@ impl SunGrid {
     }
 }
 
-/// A cone of rays: what a tile of an image sees.
+/// A cone of rays, which bounds the rays of an image tile.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cone {
-    /// Where the rays start, m; for a fisheye, where the middle one does.
+    /// Origin of the rays, site frame, m; for a fisheye, the origin of the middle ray.
     pub apex: Point3,
-    /// How far the origins of the rays lie from the apex at most, m.
+    /// Largest distance of a ray's origin from the apex, m.
     pub apex_radius_m: f64,
-    /// Unit direction of the middle ray.
+    /// Unit mean direction of the rays.
     pub axis: Vector3,
     /// Cosine of half the opening angle, which is at most a right angle.
     pub half_angle_cos: f64,
-    /// Its sine.
+    /// Sine of half the opening angle.
     pub half_angle_sin: f64,
 }
 
 impl Cone {
-    /// The narrowest cone around the middle of some rays, widened by `margin_rad`; nothing without rays.
+    /// Returns the narrowest cone around the mean direction of the rays, widened by `margin_rad`; `None` without
+    /// rays.
     pub(crate) fn around<'a>(rays: impl Iterator<Item = &'a Ray> + Clone, margin_rad: f64) -> Option<Self> {
         let count = rays.clone().count();
         let apex = rays.clone().nth(count / 2)?.origin;
@@ -280,7 +282,7 @@ impl Cone {
             chord_m2 = chord_m2.max((ray.direction - axis).norm_squared());
             apex_radius_m2 = apex_radius_m2.max((ray.origin - apex).norm_squared());
         }
-        // A chord of a narrow cone keeps the digits that a cosine loses.
+        // The chord of a narrow cone keeps digits that its cosine loses.
         let half_angle_rad = 2.0 * (0.5 * chord_m2.sqrt()).min(1.0).asin() + margin_rad;
         let (half_angle_sin, half_angle_cos) = half_angle_rad.min(std::f64::consts::FRAC_PI_2).sin_cos();
         Some(Self { apex, apex_radius_m: apex_radius_m2.sqrt(), axis, half_angle_cos, half_angle_sin })

@@ -1,18 +1,18 @@
 //! The index of a simulated traverse: stops, poses, mast angles, cameras and the names of the images.
 //!
-//! Each stop carries what the tracker may know (estimated pose, measured mast angles and the cameras that
-//! follow from them) and, apart from it, the truth. The true cameras stand in the truth only where they
-//! differ from the ones that the tracker is given, which is when the scenario has a pointing error.
+//! Each stop contains the tracker's inputs (estimated pose, measured mast angles and the cameras that follow from
+//! them) and, separately, the ground truth. The truth contains cameras only where they differ from the cameras given
+//! to the tracker, that is when the scenario has a pointing error.
 //!
-//! `camera.further` adds cameras to every stop: their images are rendered from the same poses, those on the mast at the angles of
-//! their `look_deg`, or else of the main pair (level and ahead where that is on the body). The head is turned as much elsewhere for
-//! them as for the main pair.
+//! `camera.further` adds cameras to every stop: their images are rendered from the same poses. Cameras on the mast
+//! use the angles of their `look_deg` or, by default, those of the main pair (level and ahead if that pair is on the
+//! body). Their pointing error is that of the main pair.
 //!
-//! With `camera.hand_over` one more stop follows the last: the same poses, true and estimated, and the other pair of
-//! cameras, which is fixed to the body and therefore has no mast angles (R205, R209).
+//! With `camera.hand_over` one more stop follows the last, with the same true and estimated poses and the other pair
+//! of cameras, which is fixed to the body and therefore has no mast angles (R205, R209).
 //!
-//! Time: the rover drives at 3.75 cm/s and turns at 2.1°/s along its wheels' way (domain.md 5.4) and stands
-//! for 60 s at each stop (the pause is ours).
+//! Time: the rover drives at 3.75 cm/s, turns at 2.1°/s along its path (domain.md 5.4) and pauses for 60 s at each
+//! stop (the pause is ours).
 //! Frames: poses in the site frame, cameras in the rover frame. Sources: domain.md 4, 5; R104–R106, R205.
 
 use crate::traverse::{CameraSource, FORMAT_VERSION, Stop, StopCamera, StopTruth, TraverseIndex, View};
@@ -28,16 +28,16 @@ use crate::rover::{drive, mast_error, odometry};
 use crate::scenario::{CameraRig, CameraSettings, Course, FurtherRig, Scenario};
 use crate::world::World;
 
-/// The name of the scenario's file within a traverse folder.
+/// File name of the scenario within a traverse folder.
 pub const SCENARIO_FILE: &str = "scenario.toml";
 
-/// The angles of a mast that nobody pointed: level and ahead.
+/// Mast angles without pointing: level and ahead.
 const AHEAD: MastAngles = MastAngles { azimuth_rad: 0.0, elevation_rad: 0.0 };
 
 /// Time spent at a stop, s (ours).
 pub(crate) const PAUSE_S: f64 = 60.0;
 
-/// The index of a scenario's traverse without its stops.
+/// Returns the index of a scenario's traverse without stops.
 pub fn empty_index(scenario: &Scenario) -> TraverseIndex {
     TraverseIndex {
         format: FORMAT_VERSION,
@@ -56,12 +56,12 @@ pub fn empty_index(scenario: &Scenario) -> TraverseIndex {
     }
 }
 
-/// Builds the index of a scenario's traverse; fails where the drive is impossible on this ground.
+/// Builds the index of a scenario's traverse; fails if the drive is impossible on this ground.
 pub fn index(scenario: &Scenario, world: &World) -> Result<TraverseIndex> {
     index_until(scenario, world, Cancel::default())
 }
 
-/// The same, failing soon after `cancel` is requested.
+/// [`index`], cancellable.
 pub fn index_until(scenario: &Scenario, world: &World, cancel: Cancel<'_>) -> Result<TraverseIndex> {
     let rigs = Rigs::new(&scenario.camera);
     let drive = drive::true_drive(world, scenario, cancel)?;
@@ -90,7 +90,7 @@ pub(crate) struct Rigs {
     further: Vec<FurtherPair>,
 }
 
-/// A further pair: where its rig is mounted, and the angles to which the mast is turned for it, if not those of the main pair.
+/// A further pair: its rig, and the mast angles for it; `None` for those of the main pair.
 struct FurtherPair {
     name: CameraName,
     rig: Rig,
@@ -102,7 +102,7 @@ impl FurtherPair {
         Self { name: camera.name, rig: Rig::of(camera.rig, camera.image_size), look: camera.look() }
     }
 
-    /// The told and the true angles for this pair, from those for the main pair.
+    /// Commanded and true angles for this pair, from those for the main pair.
     fn angles(&self, [told, pointed]: [Option<MastAngles>; 2]) -> [Option<MastAngles>; 2] {
         let Some(look) = self.look else { return [told, pointed] };
         let from = told.unwrap_or(AHEAD);
@@ -121,8 +121,8 @@ impl Rigs {
     }
 }
 
-/// A stop of a simulated drive; `poses` are the true and the estimated one, `pointed` are the true mast angles where they
-/// differ from those to which the mast was told to turn.
+/// A stop of a simulated drive. `poses`: true and estimated; `pointed`: true mast angles if they differ from the
+/// commanded ones.
 pub(crate) fn simulated_stop(
     number: usize,
     time_s: f64,
@@ -152,18 +152,18 @@ pub(crate) fn simulated_stop(
     }
 }
 
-/// The pair that visual odometry takes of its own at a stop, with the cameras of the main pair; the angles are the told and the
-/// true ones where these differ.
+/// The pair that visual odometry takes in addition at a stop, with the cameras of the main pair. `angles`: commanded,
+/// and true where they differ.
 pub(crate) fn odometry_pair(number: usize, rigs: &Rigs, angles: [Option<MastAngles>; 2]) -> StopCamera {
     further_camera(number, CameraName::ODOMETRY, &rigs.main, angles)
 }
 
-/// The cameras of a rig at the true mast angles, where these differ from those that the mast was told.
+/// The cameras of a rig at the true mast angles; `None` if these equal the commanded ones.
 fn true_cameras(rig: &Rig, pointed: Option<MastAngles>) -> (Option<Camera>, Option<Camera>) {
     pointed.map(|angles| rig.cameras_in_rover(Some(angles))).unzip()
 }
 
-/// A further camera of a stop, at the told and at the true mast angles of the stop where these differ.
+/// A further camera of a stop. `angles`: commanded, and true where they differ.
 fn further_camera(number: usize, name: CameraName, rig: &Rig, angles: [Option<MastAngles>; 2]) -> StopCamera {
     let [told, pointed] = match rig {
         Rig::Mast(_) => [Some(angles[0].unwrap_or(AHEAD)), angles[1]],
@@ -181,13 +181,12 @@ fn further_camera(number: usize, name: CameraName, rig: &Rig, angles: [Option<Ma
     }
 }
 
-/// An image of a stop by its eye and number, with its camera.
+/// One image of a stop with its camera.
 fn view(eye: &str, number: usize, camera: Camera) -> View {
     View { image: format!("images/{eye}_{number:04}.png"), camera: CameraSource::Inline(camera) }
 }
 
-/// The stop `number` at which the rover stands as at the last one and looks with the other pair; nothing where the
-/// target is not handed over.
+/// The hand-off stop after the last one: same pose, the other pair. `None` if the scenario has no hand-off.
 fn handed_over(last: &Stop, number: usize, settings: &CameraSettings) -> Option<Stop> {
     let (left, right) = Rig::of(settings.hand_over?, settings.image_size).cameras_in_rover(None);
     let truth = last.truth.as_ref()?;
@@ -221,8 +220,8 @@ fn handed_over(last: &Stop, number: usize, settings: &CameraSettings) -> Option<
     })
 }
 
-/// A stop at which the further pair of this name, fixed to the body, takes over from the main one; the stop as it is without such a
-/// pair.
+/// Replaces the main pair of a stop by the further pair of this name, if that pair is fixed to the body; otherwise
+/// returns the stop unchanged.
 pub(crate) fn seen_by_body(stop: Stop, number: usize, name: CameraName, rigs: &Rigs) -> Stop {
     let pair = rigs.further.iter().find(|pair| pair.name == name);
     let Some(FurtherPair { rig: rig @ Rig::Body { .. }, .. }) = pair else { return stop };
@@ -232,7 +231,7 @@ pub(crate) fn seen_by_body(stop: Stop, number: usize, name: CameraName, rigs: &R
     Stop { mast_angles: None, left, right, truth, ..stop }
 }
 
-/// One sentence for people.
+/// Describes the drive in one sentence.
 fn describe(scenario: &Scenario, stops: usize) -> String {
     let drive = &scenario.drive;
     let course = match drive.course {
@@ -259,7 +258,7 @@ fn describe(scenario: &Scenario, stops: usize) -> String {
     format!("{} {made}", scenario.description).trim_start().to_owned()
 }
 
-/// A pair of cameras in words.
+/// Describes a pair of cameras.
 fn cameras_of(rig: CameraRig) -> &'static str {
     match rig {
         CameraRig::MerNavcam => "Spirit's navcams",
@@ -271,9 +270,9 @@ fn cameras_of(rig: CameraRig) -> &'static str {
     }
 }
 
-/// The camera that truly takes an image of a simulated stop's main pair, in the site frame.
+/// Returns the true camera of an image of a simulated stop's main pair, in the site frame.
 ///
-/// `None` where the stop carries no truth, or where its camera is in a file.
+/// `None` if the stop has no truth, or if its camera model is in a file.
 pub fn true_camera_in_site(stop: &Stop, eye: Eye) -> Option<Camera> {
     let truth = stop.truth.as_ref()?;
     let (view, camera) = match eye {

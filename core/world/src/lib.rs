@@ -1,44 +1,44 @@
-//! The simulator: a rocky plain, the rover that drives over it, and the pictures that a rover takes on the way.
+//! The simulator: rocky terrain, the rover that drives over it, and the images that its cameras take.
 //!
 //! The geometry is exact: the ground is a tilted, rippled height field, rocks are solids from pebbles to boulders,
-//! both are met by rays of the true camera models exactly; shadows are cast; pixels average over their area; noise
-//! is that of a detector. Sizes, slopes, light and texture follow published laws or statistics of real frames.
-//! Everything follows from a [`Scenario`] with a seed: equal scenarios give equal bits,
-//! whatever the number of threads. The truth is exact: poses to rounding, surface points in `f64`.
+//! and rays of the true camera models intersect both exactly. Shadows are cast, pixels average over their area, and
+//! noise follows a detector model. Sizes, slopes, light and texture follow published laws or statistics of real
+//! images. Everything follows from a [`Scenario`] with a seed: equal scenarios give equal bits for any number of
+//! threads. The ground truth is exact: poses to rounding, surface points in `f64`.
 //!
-//! Nothing here knows of any tracker, and no number may be chosen by looking at what one makes of it.
+//! Nothing here depends on a tracker, and no parameter may be tuned on a tracker's results.
 //!
-//! In the order in which to read:
+//! Modules in reading order:
 //!
 //! ```text
-//! scenario       every number and its range; scenario_check: from TOML, checked; library: those that come with it
-//! ground         value_noise     hashes joined smoothly      texture     its octaves
-//!                relief          the fractal and its ripples
-//!                terrain, terrain_cast   the ground, tilted, and rays on it
-//!                far             where a slope ends
-//!                rocks, shape    one rock                    rock_field  where they lie
-//!                footing         what wheels stand on
+//! scenario       every parameter and its range; scenario_check: reads and checks TOML; library: built-in scenarios
+//! ground         value_noise     smoothed lattice noise      texture     sums of its octaves
+//!                relief          fractal height field and ripples
+//!                terrain, terrain_cast   the tilted ground and its ray casting
+//!                far             the ground beyond a slope
+//!                rocks, shape    one rock                    rock_field  where rocks are
+//!                footing         height under the wheels
 //!                details         grains, drifts, veins, pits
 //!                surface         albedo and shading normal   imprint     wheel tracks
-//! culling        which rocks a ray can meet                  solids      made things
-//! world          cast, shadow, visibility                    construction  of a scenario's world
+//! culling        candidate rocks of a ray                    solids      boxes and spheres (boards, rover body)
+//! world          ray casting, shadow, visibility             construction  of a scenario's world
 //! moment         sun, clouds, rover at a stop
 //! light          sky             direct and diffuse light    law         laws of reflection
-//!                reflection      what a surface sends        openness    contact shadows
-//! camera         rig             the pairs of cameras        sampling    rays of a tile, what they meet
-//!                shading         the light of that, many at once
+//!                reflection      reflected radiance          openness    contact shadows
+//! camera         rig             the camera pairs            sampling    rays of a tile and their hits
+//!                shading         radiance of these, in lanes
 //!                optics          point spread, flat field    render      clean radiance, development
-//!                exposure        electrons, automatic time   noise       detector, numbers
+//!                exposure        electrons, automatic time   noise       detector, digital numbers
 //!                ghost           reflections in the lenses
-//! rover          approach, plan  before there is a world     odometry    where it believes to stand
-//!                drive, course   where it truly stands
-//!                suspension      how its wheels stand        body        what casts its shadow
+//! rover          approach, plan  the plan on flat ground     odometry    the estimated poses
+//!                drive, course   the true poses
+//!                suspension      how the wheels settle       body        the parts that cast shadows
 //! index          the traverse's index                        truth       ranges, surfaces, visibility
 //! targets        the rules that choose targets
 //! ```
 //!
-//! Use: `let world = World::new(&scenario); let index = index(&scenario, &world)?;` then, for a stop and an
-//! eye, `render(&world, &scenario, &true_camera_in_site(stop, eye)?, NoiseSeed { step, eye })`.
+//! Use: `let world = World::new(&scenario); let index = index(&scenario, &world)?;` then, for a stop and an `eye`
+//! (left or right), `render(&world, &scenario, &true_camera_in_site(stop, eye)?, NoiseSeed { step, eye })`.
 //!
 //! Frames: site (level, x along the drive, origin where the rover frame of a rover on flat ground would be
 //! at the start, +z down) and rover; m, px, rad unless a name says otherwise.

@@ -1,8 +1,7 @@
-//! The scenarios that come with the simulator, as readable TOML: the papers' experiments and their difficulties.
+//! The built-in scenarios, as readable TOML: the papers' experiments and their difficulties.
 //!
-//! Each file in `library/` is a scenario as a person would write it: only what differs from the defaults, with
-//! a description that names the requirement it stages (R…) and what had to be assumed. A scenario of the library
-//! goes by the name of its file.
+//! Each file in `library/` contains only the settings that differ from the defaults, with a description that names
+//! the requirement it stages (R…) and the assumptions made. A scenario's name is the name of its file.
 
 use std::path::Path;
 
@@ -50,17 +49,17 @@ const FILES: &[(&str, &str)] = &[
     ("heading-jump", include_str!("library/heading-jump.toml")),
 ];
 
-/// The scenario with which a new user begins, by its name here …
+/// The scenario that a new user starts with: its name in the library …
 pub const FIRST: &str = "heading-jump";
-/// … and by the name that its traverse has.
+/// … and the name of its traverse.
 pub const FIRST_NAME: &str = "a heading that jumps";
 
-/// The names of the library's scenarios, in the order in which they are listed.
+/// The names of the library's scenarios, in listing order.
 pub fn names() -> impl Iterator<Item = &'static str> {
     FILES.iter().map(|(name, _)| *name)
 }
 
-/// The TOML of a scenario as it was written, with its comments.
+/// The TOML text of a scenario, with its comments; `None` for an unknown name.
 pub fn toml(name: &str) -> Option<&'static str> {
     FILES.iter().find(|(known, _)| *known == name).map(|(_, toml)| *toml)
 }
@@ -68,7 +67,7 @@ pub fn toml(name: &str) -> Option<&'static str> {
 /// A scenario of the library.
 ///
 /// # Errors
-/// A name that the library does not have; the sentence lists those that it has.
+/// An unknown name; the message lists the known ones.
 pub fn scenario(name: &str) -> Result<Scenario> {
     let text = toml(name).ok_or_else(|| {
         let known = names().collect::<Vec<_>>().join(", ");

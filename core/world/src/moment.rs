@@ -1,11 +1,10 @@
-//! A moment of the drive: where the sun stands then, what light a cloud leaves of it, what stands in the way,
-//! and where the rover's body is.
+//! A moment of the drive: the sun's position, the light that clouds leave, the occluders, and the rover's body.
 //!
-//! The scenery is shared between moments; only the lists of what shades what are made anew where the sun has
-//! moved. Directions: azimuth clockwise from above, 0 along the site's x axis; elevation up (domain.md 1.5).
+//! The scenery is shared between moments; only the shadow grid is rebuilt when the sun has moved. Directions: azimuth
+//! clockwise from above, 0 along the site's x axis; elevation up (domain.md 1.5).
 //!
-//! An occluder stands on the line from the left camera to the targets' centre, upright, its face turned to the
-//! camera, so that `at`, `width_m` and `aside_m` say what part of the view it takes wherever the rover stands.
+//! An occluder is upright on the line from the left camera to the targets' centre and faces the camera, so that `at`,
+//! `width_m` and `aside_m` define the part of the view that it covers, wherever the rover is.
 //!
 //! Frames: site. Sources: papers.md R88, R126 (cloud), R181 (fiducials), R208 (failures on purpose), R214 (the
 //! rover's own shadow); domain.md 11.1.
@@ -29,7 +28,7 @@ use crate::world::World;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::{Point3, Pose, Vector3};
 
-/// Albedo of what stands in the way.
+/// Albedo of occluders.
 const OCCLUDER_ALBEDO: f32 = 0.25;
 /// Albedo of the rover.
 const ROVER_ALBEDO: f32 = 0.4;
@@ -38,28 +37,28 @@ const HALF_THICKNESS_M: f64 = 0.005;
 /// Width and height of the block of an injected occluder, and of the one that shades a target, m.
 const FAULT_OCCLUDER_M: f64 = 0.6;
 const FAULT_SHADE_M: f64 = 0.8;
-/// Distance of the latter from the target, m.
+/// Distance of the shading block from the target, m.
 const FAULT_SHADE_AWAY_M: f64 = 2.0;
-/// The sun is not let below this elevation, deg: where the light of a scenario is defined.
+/// Lower limit of the sun's elevation, deg; the light model is defined above it.
 const LOWEST_SUN_DEG: f64 = 5.0;
 
-/// A stop as the simulator sees it.
+/// State of the drive at a stop, as input of the simulator.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Moment {
-    /// The number of the stop.
+    /// Index of the stop.
     pub stop: u32,
     /// Time since the first stop, s.
     pub time_s: f64,
-    /// Where the rover truly stands.
+    /// True pose of the rover.
     pub site_from_rover: Pose,
     /// Centre of the left camera, site frame, m.
     pub left_camera: Point3,
-    /// The places that the wheels passed so far, one list for each stop; `None` where the scenario plans the drive.
+    /// Wheel positions up to this stop, one list a stop; `None` if the scenario plans the drive.
     pub wheel_places_m: Option<Vec<Vec<WheelPlaces>>>,
 }
 
 impl Moment {
-    /// The moment of a stop of a simulated traverse; nothing where there is no such stop or it carries no truth.
+    /// Returns the moment of a stop of a simulated traverse; `None` if the stop does not exist or has no truth.
     pub fn of(number: usize, stops: &[Stop]) -> Option<Self> {
         let stop = stops.get(number)?;
         let places = |stop: &Stop| stop.truth.as_ref()?.wheel_places_m.clone();
@@ -71,7 +70,7 @@ impl Moment {
 }
 
 impl World {
-    /// This world's scenery at a moment of the drive, `scenario` being that from which it was built.
+    /// Returns this scenery at a moment of the drive. `scenario` must be the one from which the world was built.
     pub fn at(&self, moment: &Moment, scenario: &Scenario) -> Self {
         let events = &scenario.events;
         let to_sun = sun_at(&scenario.sun, events, moment.time_s);
@@ -98,12 +97,12 @@ impl World {
         Self { scenery: Arc::clone(&self.scenery), light, sun_grid, solids, imprint, exposure: self.exposure }
     }
 
-    /// The parts of the rover where it stands, its suspension settled there.
+    /// The parts of the rover at its true pose, with its suspension settled.
     fn rover_at(&self, site_from_rover: &Pose) -> Vec<Solid> {
         let place = site_from_rover.translation.vector;
         let yaw_rad = site_from_rover.rotation.euler_angles().2;
         let ground_z_m = |x_m: f64, y_m: f64| self.footing_z_at(x_m, y_m);
-        // Where no stand is found there is no such stop either.
+        // A drive has no stop where the suspension does not settle.
         let angles =
             settle(&ground_z_m, place.x, place.y, yaw_rad).map_or_else(Default::default, |s| s.angles);
         let solid = |part: BodyPart| Solid {
@@ -116,7 +115,7 @@ impl World {
         parts(&angles).into_iter().map(solid).collect()
     }
 
-    /// The wheel tracks that lie on the ground when the rover stands at a stop.
+    /// The wheel tracks on the ground at a stop.
     fn imprint_at(&self, moment: &Moment, scenario: &Scenario) -> Option<Imprint> {
         if !scenario.rover.tracks || moment.stop == 0 {
             return None;
@@ -126,7 +125,7 @@ impl World {
             return Imprint::at_stop(&Arc::new(laid), moment.stop as usize);
         }
         let laid = self.scenery.laid.get_or_init(|| {
-            // A drive that is impossible has no stops at which this could be asked.
+            // An impossible drive has no stops, so this is never reached for one.
             let drive = true_drive(self, scenario, Cancel::default()).ok()?;
             Some(Arc::new(Laid::new(&Tracks::new(&drive, &scenario.rover))))
         });
@@ -134,7 +133,7 @@ impl World {
     }
 }
 
-/// Where the sun stands some time after the first stop, s: unit direction, site frame.
+/// Unit direction to the sun, site frame, `time_s` seconds after the first stop.
 pub fn sun_at(sun: &SunSettings, events: &EventSettings, time_s: f64) -> Vector3 {
     let hours = time_s / 3600.0;
     let azimuth_deg = sun.azimuth_deg + events.sun_azimuth_deg_per_h * hours;
@@ -146,7 +145,7 @@ fn covers(from_stop: u32, to_stop: u32, stop: u32) -> bool {
     (from_stop..=to_stop).contains(&stop)
 }
 
-/// The block that stands before the camera.
+/// The block of an occluder in front of the camera.
 fn occluder(settings: &Occluder, left_camera: &Point3, targets_centre: &Point3) -> Solid {
     let sight = targets_centre - left_camera;
     let ahead = Vector3::new(sight.x, sight.y, 0.0).normalize();
@@ -164,7 +163,7 @@ fn occluder(settings: &Occluder, left_camera: &Point3, targets_centre: &Point3) 
     }
 }
 
-/// The block of an injected fault: before the target, or between it and the sun, where only its shadow is seen.
+/// The block of an injected fault: in front of the target, or (casting only its shadow) between it and the sun.
 fn of_fault(fault: &Fault, moment: &Moment, to_sun: &Vector3, targets_centre: &Point3) -> Option<Solid> {
     let target = fault.target_m.map_or(*targets_centre, Point3::from);
     match fault.kind {

@@ -8,19 +8,19 @@ use crate::scenario::{Course, Scenario};
 use crate::toml_text;
 use sightline_geometry::error::{Error, Result};
 
-/// The most characters that the name of a scenario may have.
+/// Largest number of characters in a scenario's name.
 const NAME_LIMIT: usize = 200;
 
 impl Scenario {
-    /// Reads and checks a scenario; `path` only names the culprit in the message, beside key and allowed range.
+    /// Reads and checks a scenario. `path` appears only in the error message, beside key and allowed range.
     pub fn from_toml(text: &str, path: &Path) -> Result<Self> {
         let scenario: Self = toml_text::read(text).map_err(|problem| Error::format(path, problem))?;
         scenario.validate().map_err(|problem| Error::format(path, problem.to_string()))?;
         Ok(scenario)
     }
 
-    /// Refuses settings that no world can be made of, naming the first bad one. The ranges keep sizes finite and
-    /// geometry possible; they say nothing of what is plausible on Mars.
+    /// Rejects settings from which no world can be built, naming the first bad one. The ranges keep sizes finite and
+    /// geometry possible; they do not limit a scenario to what is plausible on Mars.
     pub fn validate(&self) -> Result<()> {
         self.validate_name()?;
         if self.seed > MAX_SEED {
@@ -33,7 +33,7 @@ impl Scenario {
         self.camera.validate()?;
         self.drive.validate()?;
         if self.drive.course == Course::Moves {
-            // Whether a move is possible depends on where those before it led: the plan on flat ground tells.
+            // Whether a move is possible depends on the moves before it: check the plan on flat ground.
             planned(&self.drive)?;
         }
         self.rover.validate()?;

@@ -1,10 +1,10 @@
-//! Made things in the scene: boxes and spheres, met by rays exactly, plain or with a checkerboard on one face.
+//! Artificial objects in the scene: boxes and spheres with exact ray intersection, plain or with a checkerboard face.
 //!
 //! **Box.** With the middle m and three orthogonal half-axes a_k, a ray o + t d is inside where
 //! `|(o + t d − m)·a_k| ≤ |a_k|²` for each k: three slabs, whose intervals in t are intersected.
 //! **Sphere.** `|o + t d − m|² = r²`, a quadratic in t.
-//! **Checkerboard.** On the face a_0 = +1, squares of side s are counted from the face's corner along −a_1
-//! (to the right for one who looks at the face, when a_1 points to the looker's left) and along a_2.
+//! **Checkerboard.** On the face a_0 = +1, squares of side s are counted from the face's corner along −a_1 (to the
+//! right for a viewer of the face if a_1 points to the viewer's left) and along a_2.
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
@@ -16,29 +16,29 @@
 
 use sightline_geometry::frames::{Point3, Ray, Vector3};
 
-/// What a made thing is, and therefore which surface a ray met.
+/// Kind of an artificial object, as reported for a ray's hit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SolidKind {
     /// A fiducial of the scenario.
     Fiducial,
-    /// A thing that stands in the way.
+    /// A block in front of a camera or the sun.
     Occluder,
     /// A part of the rover.
     Rover,
 }
 
-/// How a made thing looks.
+/// Albedo pattern of an artificial object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Look {
-    /// One albedo all over.
+    /// Uniform albedo.
     Plain(f32),
-    /// Squares on the face that the first half-axis points out of; grey elsewhere.
+    /// Squares on the face of the first positive half-axis; grey elsewhere.
     Checkerboard {
         /// Side of a square, m.
         square_m: f64,
-        /// Albedo of the square in the corner and of those of its colour.
+        /// Albedo of the corner square and of every second square from it.
         first: f32,
-        /// Albedo of the others.
+        /// Albedo of the other squares.
         second: f32,
     },
 }
@@ -52,34 +52,34 @@ pub enum Shape {
     Sphere(f64),
 }
 
-/// A made thing in the site.
+/// An artificial object in the site frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solid {
-    /// What it is.
+    /// Kind of the object.
     pub kind: SolidKind,
-    /// Its middle, site frame, m.
+    /// Centre, site frame, m.
     pub middle: Point3,
-    /// Its shape.
+    /// Shape and size.
     pub shape: Shape,
-    /// Its look.
+    /// Albedo pattern.
     pub look: Look,
-    /// Whether cameras see it; what is not seen only casts its shadow.
+    /// Whether cameras see it; if false, it only casts its shadow.
     pub is_seen: bool,
 }
 
-/// Where a ray is inside a made thing.
+/// The interval of a ray inside an artificial object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Passage {
-    /// Where it enters, m; negative where it started inside.
+    /// Distance of the entry, m; negative if the ray starts inside.
     pub enter_m: f64,
-    /// Where it leaves, m.
+    /// Distance of the exit, m.
     pub leave_m: f64,
-    /// Outward unit normal where it enters.
+    /// Outward unit normal at the entry.
     pub normal: Vector3,
 }
 
 impl Solid {
-    /// Radius of a sphere about the middle that holds the thing, m.
+    /// Radius of the circumscribed sphere about the centre, m.
     pub fn radius_m(&self) -> f64 {
         match self.shape {
             Shape::Box(axes) => axes.iter().map(Vector3::norm_squared).sum::<f64>().sqrt(),
@@ -87,7 +87,8 @@ impl Solid {
         }
     }
 
-    /// Where a ray is inside, or nothing where it misses. The ray is a whole line here.
+    /// Returns the interval inside the object, or `None` if the ray misses it. The ray counts as an infinite line
+    /// here.
     pub(crate) fn passage(&self, ray: &Ray) -> Option<Passage> {
         let from_middle = ray.origin - self.middle;
         match self.shape {
@@ -127,7 +128,7 @@ impl Solid {
     }
 }
 
-/// The passage of a line through a box about the origin.
+/// The interval of a line inside a box centred on the origin.
 fn through_box(axes: &[Vector3; 3], origin: &Vector3, direction: &Vector3) -> Option<Passage> {
     let (mut enter_m, mut leave_m, mut normal) = (f64::NEG_INFINITY, f64::INFINITY, Vector3::z());
     for axis in axes {
@@ -191,7 +192,7 @@ mod tests {
         let at = |right_m: f64, up_m: f64| {
             board.albedo_at(&(board.middle + Vector3::new(-0.005, right_m, -up_m)), &-Vector3::x())
         };
-        // The lower left corner square as one sees it, then its neighbours.
+        // The lower left corner square as seen by a viewer of the face, then its neighbours.
         assert_eq!([at(-0.15, -0.05), at(-0.05, -0.05), at(-0.15, 0.05)], [0.05, 0.8, 0.8]);
         assert_eq!(board.albedo_at(&(board.middle + Vector3::x() * 0.005), &Vector3::x()), 0.3);
     }

@@ -1,14 +1,14 @@
-//! The truth of a target, and the comparison of a step with it (the words of the house; R116).
+//! Ground truth of a target, and the comparison of a tracking step with it (R116).
 //!
-//! *Truth of a target*: the surface point under the designated sub-pixel, seen through the true camera. Where no
-//! surface is known but the true poses are, the first estimate carried by the true poses stands in for it, and
-//! the error is then the drift: what tracking added.
+//! *Truth of a target*: the surface point under the designated sub-pixel, seen through the true camera. If no surface
+//! is known but the true poses are, the first estimate carried by the true poses replaces it, and the error is then
+//! the drift: what tracking added.
 //!
-//! `err_m` is measured in the present rover frame, so that the drift of the site frame is not counted:
-//! `│ p_estimated,rover − (site_from_rover,true)⁻¹ T_site │`. A target counts as tracked when its pixel error is
-//! at most max(5 px, 0.5 px × magnification so far).
+//! `err_m` is measured in the current rover frame, so that the drift of the site frame does not count:
+//! `│ p_estimated,rover − (site_from_rover,true)⁻¹ T_site │`. A target counts as tracked when its pixel error is at most
+//! max(5 px, 0.5 px × magnification so far).
 //!
-//! The crates of the stages cannot name these types: their documentation has this line as one that must not compile.
+//! The stage crates must not be able to name these types: their documentation contains this line as `compile_fail`.
 //!
 //! ```
 //! use sightline_world::target_truth::TruthSource;
@@ -25,25 +25,25 @@ use sightline_record::{Declaration, Record, Unit};
 use sightline_track::target::TrackingState;
 use sightline_track::trace::StepTrace;
 
-/// What is true of a traverse.
+/// Source of the ground truth of a traverse.
 pub trait TruthSource: Send + Sync {
-    /// Builds beforehand, so that it can be cancelled, what the truth needs and takes long.
+    /// Builds data that the truth needs and that takes long, so that this can be cancelled.
     ///
     /// # Errors
     /// [`sightline_geometry::error::Error::Cancelled`] soon after `cancel` is requested.
     fn prepare(&self, _cancel: Cancel<'_>) -> Result<()> {
         Ok(())
     }
-    /// The true pose at a stop, where it is known.
+    /// The true pose at a stop; `None` if unknown.
     fn true_site_from_rover(&self, step: usize) -> Option<Pose>;
     /// The true left camera of the main pair, or of a further camera by its name, in the rover frame; `None` at a stop that
     /// lacks it.
     fn true_left_camera(&self, step: usize, camera: Option<CameraName>) -> Option<&Camera>;
-    /// The surface point under a pixel of that camera's image, in the site frame; none where no surface is known.
+    /// The surface point under a pixel of that camera's image, site frame, m; `None` if no surface is known.
     fn surface_point_in_site(&self, step: usize, camera: Option<CameraName>, pixel: Pixel) -> Option<Point3>;
     /// Whether a point of the site frame is unoccluded in that camera's image.
     fn is_visible(&self, step: usize, camera: Option<CameraName>, point_in_site: &Point3) -> bool;
-    /// The share of a square window of that camera's image that lies in shadow, 0 to 1; none where no light is known.
+    /// Shadowed fraction of a square window of that camera's image, 0 to 1; `None` if the light is unknown.
     fn shadow_share(
         &self,
         _step: usize,
@@ -55,7 +55,7 @@ pub trait TruthSource: Send + Sync {
     }
 }
 
-/// What the truth of a target is.
+/// Definition of a target's truth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TruthKind {
@@ -68,14 +68,14 @@ pub enum TruthKind {
 /// The comparison of one step with the truth.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct StepTruth {
-    /// What the truth is.
+    /// Definition of the truth.
     pub kind: TruthKind,
     /// The true position in the true rover frame of this stop, m.
     #[schema(value_type = [f64; 3])]
     pub position_in_rover: Point3,
     /// The truth in the left image, px; null where it is not visible.
     pub left_pixel: Option<Pixel>,
-    /// Distance between estimated and true position in the present rover frame, m.
+    /// Distance between estimated and true position in the current rover frame, m.
     pub err_m: f64,
     /// Distance between located and true pixel, px; null where nothing was located or the truth is hidden.
     pub err_px: Option<f64>,
@@ -100,8 +100,8 @@ pub struct TargetTruth<'a> {
 }
 
 impl<'a> TargetTruth<'a> {
-    /// The surface point under the designated pixel, or else `estimate_in_rover` carried by the true poses;
-    /// none where not even the true poses are known.
+    /// Uses the surface point under the designated pixel, or else `estimate_in_rover` carried by the true poses.
+    /// `None` if not even the true poses are known.
     pub fn new(
         source: &'a dyn TruthSource,
         designation: sightline_track::target::Designation,
@@ -124,8 +124,8 @@ impl<'a> TargetTruth<'a> {
         self.position_in_site
     }
 
-    /// Compares a step with the truth; none where the true pose of that stop is not known, or the stop lacks the target's
-    /// pair.
+    /// Compares a step with the truth. `None` if the true pose of that stop is unknown, or the stop lacks the
+    /// target's pair.
     pub fn compare(&self, trace: &StepTrace) -> Option<StepTruth> {
         let site_from_rover = self.source.true_site_from_rover(trace.step)?;
         let camera = self.source.true_left_camera(trace.step, self.camera)?;

@@ -1,4 +1,4 @@
-//! Reading TOML so that what is wrong is one sentence with line and field: the reader's own words draw several lines.
+//! Reads TOML with one-line errors that name line and field; the errors of the `toml` crate span several lines.
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -6,10 +6,10 @@ use toml::{Table, Value};
 
 /// Reads a value.
 ///
-/// The reader of TOML ignores what an array has beyond the numbers that a field takes; here such an array is an error.
+/// Unlike the `toml` crate, rejects an array that has more values than its field takes.
 ///
 /// # Errors
-/// A sentence with the line and, where there is one, the path of the field, such as `line 2: sun.reflectance: …`.
+/// A message with the line and, if known, the path of the field, such as `line 2: sun.reflectance: …`.
 pub fn read<T: DeserializeOwned + Serialize>(text: &str) -> Result<T, String> {
     let toml = toml::Deserializer::parse(text).map_err(|error| sentence(text, &error, ""))?;
     let read: T = serde_path_to_error::deserialize(toml)
@@ -19,7 +19,7 @@ pub fn read<T: DeserializeOwned + Serialize>(text: &str) -> Result<T, String> {
     longer_array(&Value::Table(given), &Value::Table(taken), "").map_or(Ok(read), Err)
 }
 
-/// The first array of `given` that is longer than the same array of `taken`, as a sentence with its path.
+/// Describes the first array of `given` that is longer than the same array of `taken`.
 fn longer_array(given: &Value, taken: &Value, path: &str) -> Option<String> {
     match (given, taken) {
         (Value::Table(given), Value::Table(taken)) => given.iter().find_map(|(key, value)| {
@@ -45,7 +45,7 @@ fn sentence(text: &str, error: &toml::de::Error, path: &str) -> String {
     format!("{}{}{message}", line.unwrap_or_default(), field(path))
 }
 
-/// The field's path with a colon, where there is one.
+/// The field's path followed by a colon; empty if the path is unknown.
 pub fn field(path: &str) -> String {
     if matches!(path, "" | "." | "?") { String::new() } else { format!("{path}: ") }
 }

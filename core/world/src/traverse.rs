@@ -1,7 +1,7 @@
 //! The index of a traverse: stops with time, estimated pose, mast angles, camera models, image names and optional truth.
 //!
-//! The simulator produces it, `sightline_recordings` reads and writes it as TOML or JSON. It contains ground truth, which is
-//! why no crate with stages can depend on this one.
+//! The simulator produces it, `sightline_recordings` reads and writes it as TOML or JSON. It contains ground truth;
+//! therefore no stage crate may depend on this one.
 
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -14,9 +14,9 @@ use sightline_geometry::stereo_geometry::StereoGeometry;
 use sightline_rover::visual_odometry::MeasuredMotion;
 use sightline_track::target::Designation;
 
-/// The version of the folder format that this code writes.
+/// Version of the folder format that this code writes.
 pub const FORMAT_VERSION: u32 = 1;
-/// The most cameras that a stop may have beside its main pair.
+/// Largest number of cameras of a stop beside its main pair.
 pub const FURTHER_CAMERAS_LIMIT: usize = 16;
 
 /// The index of a traverse: `traverse.toml` or `traverse.json` of the folder.
@@ -42,7 +42,7 @@ pub struct TraverseIndex {
     /// The error model of the pose estimates.
     #[serde(default)]
     pub odometry_error: OdometryError,
-    /// The mast that carries the cameras, where it is known.
+    /// The mast that carries the cameras, if known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mast: Option<Mast>,
     /// The file with the simulated scenario from which missing images are rendered.
@@ -64,16 +64,16 @@ pub struct Stop {
     pub time_s: f64,
     /// The estimated pose of the rover in the site frame.
     pub site_from_rover: PoseRecord,
-    /// How vision measured the motion to this stop, where it did.
+    /// How visual odometry measured the motion to this stop, if it did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub odometry: Option<MeasuredMotion>,
     /// Whether visual odometry ran alone here: no tracker looks for its target at this stop.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub odometry_alone: bool,
-    /// The target at which a drive pointed the mast; left out where it was pointed at none.
+    /// The target at which a drive pointed the mast; left out if it pointed at none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mast_target: Option<Designation>,
-    /// The mast angles at which the pair was taken, where there is a mast.
+    /// The mast angles at which the pair was taken, if there is a mast.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mast_angles: Option<MastAngles>,
     /// Centre of the subframe that automatic exposure meters in the left image, px; the image's centre where left out.
@@ -83,13 +83,13 @@ pub struct Stop {
     pub left: View,
     /// The right (or second) image.
     pub right: View,
-    /// How the pair was lit and exposed, where the recording says so.
+    /// Light and exposure of the pair, if the recording contains them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub light: Option<StopLight>,
-    /// What is known to be true, where anything is.
+    /// Ground truth of the stop, if known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truth: Option<StopTruth>,
-    /// Further cameras of the stop beside the main pair `left` and `right`, each with a name of its own.
+    /// Further cameras of the stop beside the main pair `left` and `right`, with unique names.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cameras: Vec<StopCamera>,
 }
@@ -112,7 +112,7 @@ impl Stop {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StopCamera {
-    /// Its name, which no other camera of the stop has; the same name at another stop is the same camera.
+    /// Name, unique within the stop; the same name at another stop is the same camera.
     pub name: CameraName,
     /// The mast angles at which the images were taken; left out for a camera on the body.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -134,11 +134,11 @@ pub struct StopCamera {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StopLight {
-    /// Where the sun stands, clockwise from the site frame's +x seen from above, deg.
+    /// Azimuth of the sun, clockwise from the site frame's +x seen from above, deg.
     pub sun_azimuth_deg: f64,
-    /// Its height over the level, deg.
+    /// Elevation of the sun above the horizon, deg.
     pub sun_elevation_deg: f64,
-    /// For how long the left image was exposed, s.
+    /// Exposure time of the left image, s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure_s: Option<f64>,
 }
@@ -163,7 +163,7 @@ pub struct View {
 
 /// A camera model, written in the index or in a file of JPL's text form beside it.
 ///
-/// Read by hand below, because an untagged enum could not say which field is wrong.
+/// Deserialised by hand below: an untagged enum could not report which field is wrong.
 #[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
 #[serde(untagged)]
 pub enum CameraSource {
@@ -185,17 +185,17 @@ pub struct StopTruth {
     /// The true left camera in the rover frame, where it differs from the one the tracker is given.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "optional_camera")]
     pub left_camera: Option<Camera>,
-    /// The true right camera in the rover frame, alike.
+    /// The true right camera in the rover frame, where it differs from the one the tracker is given.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "optional_camera")]
     pub right_camera: Option<Camera>,
-    /// Where the six wheels left tracks on the way to this stop: x and y of the places that they passed, in the order of
-    /// time, site frame, m. Left out where they left none, or where the scenario plans the drive.
+    /// Positions (x, y) of the six wheels on the way to this stop, where they left tracks: in order of time, site
+    /// frame, m. Left out where they left none, or where the scenario plans the drive.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(value_type = Option<Vec<[[f64; 2]; 6]>>)]
     pub wheel_places_m: Option<Vec<WheelPlaces>>,
 }
 
-/// x and y of the six wheels in the site frame, m: left front, right front, left middle, right middle, left rear, right rear.
+/// x and y of the six wheels, site frame, m: left front, right front, left middle, right middle, left rear, right rear.
 pub type WheelPlaces = [[f64; 2]; 6];
 
 impl<'de> Deserialize<'de> for CameraSource {
@@ -214,7 +214,7 @@ impl<'de> Deserialize<'de> for CameraSource {
     }
 }
 
-/// Reads a camera that may be left out, and refuses fields that cameras do not have.
+/// Reads an optional camera; rejects unknown fields.
 fn optional_camera<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Camera>, D::Error> {
     let table = Option::<serde_json::Map<_, _>>::deserialize(deserializer)?;
     table.map(camera_from_table).transpose().map_err(D::Error::custom)
@@ -232,7 +232,7 @@ fn camera_from_table(table: serde_json::Map<String, serde_json::Value>) -> Resul
     if let Some(unknown) = table.keys().find(|key| !known(key)) {
         return Err(format!("unknown field `{unknown}`, expected model, size, {}", fields.join(", ")));
     }
-    // TOML can state numbers that are not finite, which become null in the table.
+    // TOML allows numbers that are not finite; they become null in the table.
     let is_number = |value: &serde_json::Value| value.is_number();
     for field in fields {
         match (*field, table.get(*field)) {

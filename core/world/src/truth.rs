@@ -1,13 +1,13 @@
-//! The truth of a picture: ranges, surfaces and normals of every pixel, and where any point of the site appears.
+//! Ground truth of an image: range, surface and normal of every pixel, and the projection of any point of the site.
 //!
-//! A pixel's truth is that of the ray through its centre, by the camera model itself. The range is the distance
-//! along that ray from where the ray starts (for a fisheye: the entrance pupil of that ray), so that the
-//! surface point is `origin + range · direction`.
+//! A pixel's truth is that of the ray through its centre, by the camera model itself. The range is the distance along that
+//! ray from its origin (for a fisheye: the entrance pupil of that ray), so that the surface point is
+//! `origin + range · direction`.
 //!
-//! A point is *visible* when it lies in the picture and nothing stands between it and the origin of its pixel's
-//! ray; whether it is lit is told beside that, since a tracker can lose a point to either.
+//! A point is *visible* when it projects into the image and nothing occludes it from the origin of its pixel's ray.
+//! Whether it is lit is reported separately, since a tracker can lose a point for either reason.
 //!
-//! Frames: site, m; pixels of the picture. Sources: domain.md 2.3 (entrance pupil).
+//! Frames: site, m; pixels of the image. Sources: domain.md 2.3 (entrance pupil).
 
 use rayon::prelude::*;
 
@@ -15,7 +15,7 @@ use crate::world::{Hit, SurfaceId, World};
 use sightline_geometry::camera::Camera;
 use sightline_geometry::frames::{Pixel, Point3};
 
-/// The truth of every pixel of a picture, row by row.
+/// Ground truth of every pixel of an image, row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PictureTruth {
     /// Pixels in a row.
@@ -24,34 +24,34 @@ pub struct PictureTruth {
     pub height: u32,
     /// Distance along the pixel's ray, m; infinite for the sky.
     pub range_m: Vec<f64>,
-    /// What is seen; nothing for the sky.
+    /// Surface seen; `None` for the sky.
     pub surface: Vec<Option<SurfaceId>>,
     /// Outward unit normal in the site frame; zero for the sky.
     pub normal: Vec<[f32; 3]>,
 }
 
-/// Where a point of the site appears in a picture.
+/// Where a point of the site projects in an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Visibility {
-    /// It is seen.
+    /// Inside the image and not occluded.
     Visible {
-        /// Where, px.
+        /// Its projection, px.
         pixel: Pixel,
         /// Whether the sun reaches it.
         is_lit: bool,
     },
-    /// Something stands before it.
+    /// Inside the image, but occluded.
     Occluded {
-        /// Where it would be seen, px.
+        /// Its projection, px.
         pixel: Pixel,
-        /// What stands before it.
+        /// The occluding surface.
         by: SurfaceId,
     },
-    /// It lies beside the picture, or behind the camera.
+    /// Outside the image, or behind the camera.
     OutOfFrame,
 }
 
-/// The truth of every pixel of a camera that stands in the site.
+/// Computes the ground truth of every pixel of a camera in the site frame.
 pub fn picture_truth(world: &World, camera_in_site: &Camera) -> PictureTruth {
     let (width, height) = (camera_in_site.width(), camera_in_site.height());
     let of_row =
@@ -67,12 +67,12 @@ pub fn picture_truth(world: &World, camera_in_site: &Camera) -> PictureTruth {
     }
 }
 
-/// The surface that a position of a picture shows, px; nothing for the sky or where the model has no ray.
+/// The surface seen at a pixel position, px; `None` for the sky or where the model has no ray.
 pub fn pixel_truth(world: &World, camera_in_site: &Camera, pixel: Pixel) -> Option<Hit> {
     world.cast(&camera_in_site.ray(pixel)?)
 }
 
-/// Where a point of a surface appears in a camera that stands in the site.
+/// Projects a surface point into a camera in the site frame and tests occlusion and shadow.
 pub fn visibility(world: &World, camera_in_site: &Camera, point_in_site: &Point3) -> Visibility {
     let seen = camera_in_site
         .project(point_in_site)

@@ -1,13 +1,12 @@
-//! The world of a scenario: what a ray meets, exactly; what is in shadow; what can be seen from where.
+//! The world of a scenario: exact ray casting, shadows and visibility.
 //!
-//! A [`World`] is the scenery, which never changes and is shared, at one moment of the drive: where the sun
-//! stands, what stands in the way, where the rover is ([`World::at`], `moment.rs`). It follows from the scenario
-//! alone and can be shared between threads. Geometry is `f64` throughout and exact: the ground's patches are met
-//! at the root of a quadratic (`terrain_cast.rs`), rocks at the ends of an interval (`rocks.rs`), made things
-//! alike (`solids.rs`).
+//! A [`World`] is the shared, constant scenery at one moment of the drive: position of the sun, occluders, pose of
+//! the rover ([`World::at`], `moment.rs`). It follows from the scenario alone and can be shared between threads.
+//! Geometry is `f64` throughout and exact: rays meet the ground's patches at the root of a quadratic
+//! (`terrain_cast.rs`), rocks and artificial objects at the ends of an interval (`rocks.rs`, `solids.rs`).
 //!
-//! Frame: site (level, x along the drive, +z down), m. A surface point is tested for shadow and visibility
-//! with rays that start 1 µm off it, so that it does not hide itself.
+//! Frame: site (level, x along the drive, +z down), m. Shadow and visibility tests ignore hits within 1 µm of the
+//! surface point, so that a point does not hide itself.
 //! Sources: domain.md 10, 11; the definition of a target's truth as the surface point under its pixel.
 
 use std::sync::{Arc, OnceLock};
@@ -25,34 +24,34 @@ use crate::light::reflection::Light;
 use crate::solids::{Solid, SolidKind};
 use sightline_geometry::frames::{Point3, Ray, Vector3};
 
-/// How far off its surface a ray starts, m.
+/// Hits nearer to the surface point than this do not count, m.
 const OFF_SURFACE_M: f64 = 1e-6;
 
-/// What a ray met.
+/// The surface that a ray met.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SurfaceId {
     /// The ground.
     Ground,
-    /// The rock of this number.
+    /// A rock, by its index.
     Rock(u32),
-    /// A made thing, by its kind and its number among those present.
+    /// An artificial object: its kind, and its index in [`World::solids`].
     Solid(SolidKind, u32),
 }
 
-/// Where a ray met a surface.
+/// First intersection of a ray with a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// The point, site frame, m.
     pub point: Point3,
-    /// Outward unit normal of the surface itself, site frame.
+    /// Outward unit normal of the geometry (without micro-relief), site frame.
     pub normal: Vector3,
     /// Distance from the ray's origin, m.
     pub distance_m: f64,
-    /// What was met.
+    /// The surface met.
     pub surface: SurfaceId,
 }
 
-/// What never changes: ground, rocks, and their look.
+/// The constant part of the world: ground, rocks, and their appearance.
 #[derive(Clone, Debug)]
 pub(crate) struct Scenery {
     pub(crate) terrain: Terrain,
@@ -62,7 +61,7 @@ pub(crate) struct Scenery {
     pub(crate) footing: Footing,
     pub(crate) tree: Tree,
     pub(crate) targets_centre: Point3,
-    /// The wheel tracks of the whole drive, driven when they are first asked for; nothing where it fails.
+    /// The wheel tracks of the whole drive, computed on first use; `None` if the drive is impossible.
     pub(crate) laid: OnceLock<Option<Arc<Laid>>>,
 }
 
@@ -73,7 +72,7 @@ pub struct World {
     pub(crate) light: Light,
     pub(crate) sun_grid: Arc<SunGrid>,
     pub(crate) solids: Vec<Solid>,
-    /// Wheel tracks; nothing where the wheels leave none.
+    /// Wheel tracks; `None` if there are none.
     pub(crate) imprint: Option<Imprint>,
     /// Fraction of full scale per unit of radiance.
     pub(crate) exposure: f64,
@@ -85,12 +84,12 @@ impl World {
         &self.scenery.rocks
     }
 
-    /// The made things that are there now; `SurfaceId::Solid(_, n)` is the n-th.
+    /// The artificial objects at this moment; `SurfaceId::Solid(_, n)` is the n-th.
     pub fn solids(&self) -> &[Solid] {
         &self.solids
     }
 
-    /// The point that the rover approaches and the mast looks at, on the surface, site frame, m.
+    /// The surface point that the rover approaches and the mast is pointed at, site frame, m.
     pub fn targets_centre(&self) -> Point3 {
         self.scenery.targets_centre
     }
@@ -100,28 +99,28 @@ impl World {
         self.light.to_sun
     }
 
-    /// The rectangle of ground that has relief and rocks: from and to along x, and along y, site frame, m.
+    /// The rectangle of ground with relief and rocks, site frame, m: lower and upper limit along x, then along y.
     pub fn ground_extent_m(&self) -> [[f64; 2]; 2] {
         let Terrain { origin_m, cell_m, cells, .. } = self.scenery.terrain;
         [0, 1].map(|axis| [origin_m[axis], origin_m[axis] + cell_m * cells[axis] as f64])
     }
 
-    /// Height of the bare ground at a place, m down, site frame.
+    /// z of the bare ground at (x, y), site frame, m, positive down.
     pub fn ground_z_at(&self, x_m: f64, y_m: f64) -> f64 {
         self.scenery.terrain.z_at(x_m, y_m)
     }
 
-    /// Height of what a wheel stands on at a place, ground or rock, m down, site frame.
+    /// z of the ground or rock that supports a wheel at (x, y), site frame, m, positive down.
     pub(crate) fn footing_z_at(&self, x_m: f64, y_m: f64) -> f64 {
         self.scenery.footing.z_at(&self.scenery.terrain, x_m, y_m)
     }
 
-    /// The height of the rock, m, that stands at a place and is too high for a wheel to climb, if one does.
+    /// Height of the rock at (x, y) that is too high for a wheel to climb, m; `None` if there is none.
     pub(crate) fn blocked_by_m(&self, x_m: f64, y_m: f64) -> Option<f64> {
         self.scenery.footing.blocked_by_m(&self.scenery.rocks, x_m, y_m)
     }
 
-    /// The first surface that a ray meets; the ray's direction is unit.
+    /// Returns the first intersection of a ray, whose direction must be a unit vector.
     pub fn cast(&self, ray_in_site: &Ray) -> Option<Hit> {
         let scenery = &*self.scenery;
         let ground_m = scenery.terrain.cast(ray_in_site, 0.0, f64::INFINITY);
@@ -152,7 +151,7 @@ impl World {
         Some(Hit { point, normal, distance_m: nearest_m, surface })
     }
 
-    /// The first made thing that a camera's ray meets nearer than `to_m`: its number, distance (m) and normal.
+    /// The first visible artificial object on a ray nearer than `to_m`: its index, distance (m) and normal.
     pub(crate) fn solid_on(&self, ray_in_site: &Ray, to_m: f64) -> Option<(usize, f64, Vector3)> {
         let seen = self.solids.iter().enumerate().filter(|(_, solid)| solid.is_seen);
         let met = seen.filter_map(|(index, solid)| {
@@ -166,7 +165,7 @@ impl World {
         met.min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// What stands between `from` and a point of a surface, if anything does.
+    /// The surface that occludes a surface point from `from`; `None` if the point is visible.
     pub(crate) fn in_the_way(&self, from: &Point3, point: &Point3) -> Option<SurfaceId> {
         let way = point - from;
         let distance_m = way.norm();
@@ -174,17 +173,17 @@ impl World {
         self.cast(&ray).filter(|hit| hit.distance_m <= distance_m - OFF_SURFACE_M).map(|hit| hit.surface)
     }
 
-    /// Whether nothing stands between `from` and a point of a surface.
+    /// Whether a surface point is visible from `from`.
     pub fn is_visible(&self, from: &Point3, point: &Point3) -> bool {
         self.in_the_way(from, point).is_none()
     }
 
-    /// Whether a point of a surface gets no sun: another surface, or its own, stands in the way.
+    /// Whether a surface point is in shadow, its own surface's (self-shadow) included.
     pub fn in_shadow(&self, point: &Point3) -> bool {
         self.is_blocked(&Ray { origin: *point, direction: self.light.to_sun })
     }
 
-    /// [`World::in_shadow`] of many points where the rocks that can shade them are known.
+    /// [`World::in_shadow`] of many points, given the rocks that can shade them.
     #[inline(always)]
     pub(crate) fn in_shadow_lanes(&self, points: &[Lanes; 3], count: usize, rocks: &[u32]) -> [bool; LANES] {
         let direction = self.light.to_sun;
@@ -203,7 +202,7 @@ impl World {
         is_dark
     }
 
-    /// Whether anything stands on a ray to the sun.
+    /// Whether anything blocks a ray to the sun.
     #[inline(always)]
     pub(crate) fn is_blocked(&self, to_sun: &Ray) -> bool {
         self.is_blocked_by_rock(to_sun)
@@ -211,17 +210,17 @@ impl World {
             || self.is_blocked_by_ground(to_sun)
     }
 
-    /// Whether a rock, or the rock on which the ray starts, stands on a ray to the sun.
+    /// Whether a rock (that on which the ray starts included) blocks a ray to the sun.
     #[inline(always)]
     fn is_blocked_by_rock(&self, to_sun: &Ray) -> bool {
         self.sun_grid.towards_sun(&to_sun.origin).iter().any(|&index| {
             let interval = self.scenery.rocks[index as usize].interval(to_sun);
-            // Where the ray starts on a lit face it leaves at once.
+            // A ray that starts on a lit face leaves the rock at once.
             interval.is_some_and(|i| leaves_behind(i.enter_m, i.leave_m))
         })
     }
 
-    /// Whether a made thing, or the one on which the ray starts, stands on a ray to the sun.
+    /// Whether an artificial object (that on which the ray starts included) blocks a ray to the sun.
     #[inline(always)]
     fn is_blocked_by_solid(&self, to_sun: &Ray) -> bool {
         self.solids
@@ -229,17 +228,17 @@ impl World {
             .any(|solid| solid.passage(to_sun).is_some_and(|p| leaves_behind(p.enter_m, p.leave_m)))
     }
 
-    /// Whether the ground stands on a ray to the sun.
+    /// Whether the ground blocks a ray to the sun.
     #[inline(always)]
     fn is_blocked_by_ground(&self, to_sun: &Ray) -> bool {
         let terrain = &self.scenery.terrain;
-        // Most grounds are nowhere as steep as the sun is high.
+        // Most grounds are nowhere as steep as the sun's elevation.
         let rise = -to_sun.direction.z / to_sun.direction.xy().norm();
         rise <= terrain.steepest() && terrain.cast(to_sun, OFF_SURFACE_M, f64::INFINITY).is_some()
     }
 }
 
-/// Whether a ray that is inside something over [enter, leave] goes through it after its start.
+/// Whether a ray that is inside an object over [enter, leave] passes through it after its start.
 #[inline(always)]
 fn leaves_behind(enter_m: f64, leave_m: f64) -> bool {
     leave_m - enter_m.max(0.0) > OFF_SURFACE_M && leave_m > OFF_SURFACE_M

@@ -6,7 +6,7 @@
 //! x = d·H/ζ      y = d·V/ζ                        for ζ > 0
 //! ∂x/∂P = (H − xA)/ζ      ∂y/∂P = (V − yA)/ζ      px/m
 //! ray of (x, y): from C along (f × g)/(A·(V × H)),  f = V − yA,  g = H − xA
-//! hc = A·H   hs = |A × H|   H' = (H − hc A)/hs    and vc, vs alike from V
+//! hc = A·H   hs = |A × H|   H' = (H − hc A)/hs    and vc, vs likewise from V
 //! θ = atan2((V × H)·A, (A × V)·(A × H))
 //! ```
 //!
@@ -40,7 +40,7 @@ pub struct Cahv {
     pub vertical: Vector3,
 }
 
-/// What A, H and V say about the image plane.
+/// The image plane that A, H and V define.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ImagePlane {
     /// Horizontal scale |A × H|, px.
@@ -71,7 +71,7 @@ impl Cahv {
         self.project_vector(&(point - self.centre))
     }
 
-    /// The pixel of a point (m) and its derivative by the point, px/m.
+    /// The pixel of a point (m) and its derivative with respect to the point, px/m.
     pub fn project_with_jacobian(&self, point: &Point3) -> Option<(Pixel, Matrix2x3<f64>)> {
         let from_centre = point - self.centre;
         let pixel = self.project_vector(&from_centre)?;
@@ -92,7 +92,7 @@ impl Cahv {
         (depth > 0.0 && pixel.x.is_finite() && pixel.y.is_finite()).then_some(pixel)
     }
 
-    /// Derivative of the pixel by the vector from C that projects to it.
+    /// Derivative of the pixel with respect to the vector from C that projects to it.
     pub(super) fn pixel_by_vector(&self, from_centre: &Vector3, pixel: Pixel) -> Matrix2x3<f64> {
         let depth = from_centre.dot(&self.axis);
         let by_x = (self.horizontal - self.axis * pixel.x) / depth;
@@ -126,7 +126,7 @@ impl Cahv {
         (self.horizontal - self.axis * plane.hc) / plane.hs
     }
 
-    /// Whether the numbers can be a camera; the error is a sentence that names the vector at fault.
+    /// Checks that the numbers describe a camera; the error is a sentence that names the invalid vector.
     pub(super) fn validate(&self) -> Result<(), String> {
         let vectors =
             [("C", &self.centre.coords), ("A", &self.axis), ("H", &self.horizontal), ("V", &self.vertical)];
@@ -145,7 +145,7 @@ impl Cahv {
     }
 }
 
-/// An error that names the vector unless all its numbers are finite.
+/// Returns an error that names the vector unless all its numbers are finite.
 pub(super) fn check_finite(name: &str, numbers: &[f64]) -> Result<(), String> {
     match numbers.iter().find(|v| !v.is_finite()) {
         None => Ok(()),
@@ -153,7 +153,7 @@ pub(super) fn check_finite(name: &str, numbers: &[f64]) -> Result<(), String> {
     }
 }
 
-/// An error that names the vector unless its length is within 0.1 of 1.
+/// Returns an error that names the vector unless its length is within 0.1 of 1.
 pub(super) fn check_unit(name: &str, vector: &Vector3) -> Result<(), String> {
     let length = vector.norm();
     if (length - 1.0).abs() < 0.1 {

@@ -9,8 +9,8 @@
 //! ray: CAHV direction rr; ω, λ, τ of rr; u undoes the distortion; from C along unit(rr − (1 − u) λ)
 //! ```
 //!
-//! O is unit and its angle to A may be several degrees (7.5° in Spirit's left navcam); R = (r0, r1, r2)
-//! has no unit. Departure: a τ beyond the fold of the polynomial is refused (`distortion`).
+//! O is unit and its angle to A may be several degrees (7.5° in Spirit's left navcam); R = (r0, r1, r2) has no unit.
+//! Departure: a τ beyond the fold of the polynomial is rejected (`distortion`).
 
 use nalgebra::{Matrix2x3, Matrix3};
 use serde::{Deserialize, Serialize};
@@ -35,7 +35,7 @@ pub struct Cahvor {
     pub radial: [f64; 3],
 }
 
-/// The vector d taken apart about the optical axis.
+/// The vector d, decomposed about the optical axis.
 struct Parts {
     /// Along O, m.
     omega: f64,
@@ -63,7 +63,7 @@ impl Cahvor {
         self.linear.project_vector(&(d + parts.lambda * self.polynomial().factor(parts.tau)))
     }
 
-    /// The pixel of a point (m) and its derivative by the point, px/m.
+    /// The pixel of a point (m) and its derivative with respect to the point, px/m.
     pub fn project_with_jacobian(&self, point: &Point3) -> Option<(Pixel, Matrix2x3<f64>)> {
         let d = point - self.linear.centre;
         let Parts { omega, lambda, tau } = self.take_apart(&d)?;
@@ -79,7 +79,7 @@ impl Cahvor {
         Some((pixel, self.linear.pixel_by_vector(&distorted, pixel) * distorted_by_point))
     }
 
-    /// The ray of a pixel: it starts at C; `None` where the distortion cannot be undone.
+    /// The ray of a pixel: it starts at C; `None` if the distortion has no inverse there.
     pub fn ray(&self, pixel: Pixel) -> Option<Ray> {
         let seen = self.linear.forward(pixel)?;
         let omega = seen.dot(&self.optical_axis);
@@ -103,7 +103,7 @@ impl Cahvor {
         (omega > 0.0 && self.polynomial().is_one_to_one(tau)).then_some(Parts { omega, lambda, tau })
     }
 
-    /// Whether O and R can be a camera's; the linear part is checked by itself.
+    /// Checks that O and R describe a camera; the linear part is checked separately.
     pub(super) fn validate(&self) -> Result<(), String> {
         check_finite("O", self.optical_axis.as_slice())?;
         check_finite("R", &self.radial)?;

@@ -15,9 +15,9 @@
 //!   origin = C + sO,  s = (θ/sin θ − 1) ε   direction = sin θ unit(λ') + cos θ O
 //! ```
 //!
-//! A ray does not start at C: s reaches 5.8 mm in a MER hazcam, 1.2 px at 1 m. Points with ζ < 0 may be
-//! seen, since such lenses look back beyond 90°. Departures: rays are made unit even when O is not; a χ
-//! beyond the fold of the polynomial is refused (`distortion`), otherwise what lies behind a hazcam would
+//! A ray does not start at C: s reaches 5.8 mm in a MER hazcam, 1.2 px at 1 m. Points with ζ < 0 may be visible,
+//! since the field of view of such lenses extends beyond 90°. Departures: rays have unit direction even if O is not
+//! unit; a χ beyond the fold of the polynomial is rejected (`distortion`), otherwise points behind a hazcam would
 //! appear in its image. On the axis VICAR takes rp = d; its derivative there includes r0.
 
 use nalgebra::{Matrix2x3, Matrix3};
@@ -28,7 +28,7 @@ use super::cahv::{Cahv, check_finite, check_unit};
 use super::distortion::{Radial, made_unit, newton};
 use crate::frames::{Pixel, Point3, Ray, Vector3};
 
-/// Angle, rad, and radius below which a ray lies on the optical axis.
+/// Angle, rad, and radius below which a ray is taken as the optical axis.
 const ON_AXIS: f64 = 1e-8;
 
 /// The kind of imaging law, T in files.
@@ -86,12 +86,12 @@ pub struct Cahvore {
     #[serde(rename = "T")]
     #[schema(value_type = u8)]
     pub imaging: Imaging,
-    /// P: linearity of the general law (T = 3), otherwise without meaning.
+    /// P: linearity of the general law (T = 3), otherwise unused.
     #[serde(rename = "P", default)]
     pub linearity_parameter: f64,
 }
 
-/// The vector d taken apart about the optical axis, with the angle of its ray.
+/// The vector d, decomposed about the optical axis, with the angle of its ray.
 struct Parts {
     /// ζ: along O, m.
     zeta: f64,
@@ -124,7 +124,7 @@ impl Cahvore {
         Self::as_printed(linear, made_unit(optical_axis), radial, pupil, law)
     }
 
-    /// L: 1 perspective, 0 fisheye, anything between or below for the general law.
+    /// L: 1 for perspective, 0 for fisheye, P for the general law.
     pub fn linearity(&self) -> f64 {
         match self.imaging {
             Imaging::Perspective => 1.0,
@@ -133,7 +133,7 @@ impl Cahvore {
         }
     }
 
-    /// The pixel of a point (m); `None` outside the field the model can describe.
+    /// The pixel of a point (m); `None` outside the model's domain.
     pub fn project(&self, point: &Point3) -> Option<Pixel> {
         let d = point - self.linear.centre;
         let Parts { lambda, theta, .. } = self.take_apart(&d)?;
@@ -145,7 +145,7 @@ impl Cahvore {
         self.linear.project_vector(&(self.optical_axis * (lambda.norm() / chi) + lambda * (1.0 + mu)))
     }
 
-    /// The pixel of a point (m) and its derivative by the point, px/m.
+    /// The pixel of a point (m) and its derivative with respect to the point, px/m.
     pub fn project_with_jacobian(&self, point: &Point3) -> Option<(Pixel, Matrix2x3<f64>)> {
         let d = point - self.linear.centre;
         let Parts { zeta, lambda, theta } = self.take_apart(&d)?;
@@ -173,7 +173,7 @@ impl Cahvore {
         Some((pixel, self.linear.pixel_by_vector(&bent, pixel) * bent_by_point))
     }
 
-    /// The ray of a pixel, from the entrance pupil of its angle; `None` where the bending has no inverse.
+    /// The ray of a pixel, from the entrance pupil of its angle; `None` if the distortion has no inverse there.
     pub fn ray(&self, pixel: Pixel) -> Option<Ray> {
         let seen = self.linear.forward(pixel)?;
         let o = self.optical_axis;
@@ -246,14 +246,14 @@ impl Cahvore {
         (theta < std::f64::consts::PI).then_some(theta)
     }
 
-    /// μ of χ, unless χ lies beyond the fold of the polynomial.
+    /// μ of χ; `None` beyond the fold of the polynomial.
     fn distortion_within_fold(&self, chi: f64) -> Option<f64> {
         let polynomial = Radial::new(self.radial);
         let t = chi * chi;
         polynomial.is_one_to_one(t).then(|| polynomial.factor(t))
     }
 
-    /// Whether O, R, E and P can be a camera's; the linear part is checked by itself.
+    /// Checks that O, R, E and P describe a camera; the linear part is checked separately.
     pub(super) fn validate(&self) -> Result<(), String> {
         check_finite("O", self.optical_axis.as_slice())?;
         check_finite("R", &self.radial)?;

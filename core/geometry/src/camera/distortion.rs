@@ -1,27 +1,26 @@
-//! What CAHVOR and CAHVORE share: the radial polynomial, its inverse, and Newton's iteration.
+//! The radial polynomial of CAHVOR and CAHVORE, its inverse, and Newton's iteration.
 //!
-//! A radius χ (tangent, or the fisheye's image of the angle) is seen at (domain.md 2.2, 2.3; Gennery 2006)
+//! A radius χ (tangent, or the fisheye image of the angle) is imaged at (domain.md 2.2, 2.3; Gennery 2006)
 //!
 //! ```text
 //! χ' = χ (1 + μ),   μ = r0 + r1 t + r2 t²,   t = χ²
 //! ```
 //!
-//! and going back solves `k1 u + k3 u³ + k5 u⁵ = 1` for the ratio u = χ/χ', with k1 = 1 + r0, k3 = r1 χ'²
-//! and k5 = r2 χ'⁴. Two departures from VICAR's code. Newton starts at u = 1 instead of
-//! 1 − (r0 + k3 + k5): from there it cannot overshoot the fold of a polynomial with negative terms. And a
-//! radius beyond the first fold (where dχ'/dχ = 1 + r0 + 3 r1 t + 5 r2 t² reaches zero) is refused in both
-//! directions: beyond it the polynomial turns back, so that points behind a hazcam would appear in its
-//! image, mirrored.
+//! The inverse solves `k1 u + k3 u³ + k5 u⁵ = 1` for the ratio u = χ/χ', with k1 = 1 + r0, k3 = r1 χ'² and k5 = r2
+//! χ'⁴. Two departures from VICAR's code: Newton starts at u = 1 instead of 1 − (r0 + k3 + k5), from where it cannot
+//! overshoot the fold of a polynomial with negative terms; and a radius beyond the first fold (where dχ'/dχ = 1 + r0
+//! + 3 r1 t + 5 r2 t² reaches zero) is rejected in both directions: beyond it the polynomial decreases, so that
+//! points behind a hazcam would appear in its image, mirrored.
 
 use crate::frames::Vector3;
 
 /// Newton's step below which the iteration has converged, relative to max(1, |x|).
 const CONVERGED: f64 = 1e-14;
-/// Step that is good enough when the iterations are used up (VICAR's own tolerance).
+/// Step that is accepted when the iterations are used up (VICAR's own tolerance).
 const ACCEPTABLE: f64 = 1e-8;
 /// Largest number of Newton steps (VICAR's limit).
 const STEPS: usize = 100;
-/// Smallest slope with which Newton's iteration goes on (VICAR's limit).
+/// Smallest slope with which Newton's iteration continues (VICAR's limit).
 const FLAT: f64 = 1e-15;
 
 /// Radial distortion μ(t) = r0 + r1 t + r2 t² of the squared radius t.
@@ -47,7 +46,7 @@ impl Radial {
         self.r1 + 2.0 * self.r2 * t
     }
 
-    /// Whether the seen radius grows with the true one all the way from the axis to the squared radius t.
+    /// Whether the distorted radius increases with the undistorted one from the axis to the squared radius t.
     pub(super) fn is_one_to_one(self, t: f64) -> bool {
         let (a, b, c) = (1.0 + self.r0, 3.0 * self.r1, 5.0 * self.r2);
         let slope = |t: f64| a + t * (b + t * c);
@@ -56,7 +55,7 @@ impl Radial {
         slope(0.0) > 0.0 && slope(t) > 0.0 && (!dips || slope(turning) > 0.0)
     }
 
-    /// The ratio u of the true to the seen radius, given the squared seen radius.
+    /// The ratio u of the undistorted to the distorted radius, given the square of the latter; `None` without an inverse.
     pub(super) fn undo(self, t_seen: f64) -> Option<f64> {
         let (k1, k3, k5) = (1.0 + self.r0, self.r1 * t_seen, self.r2 * t_seen * t_seen);
         let ratio = newton(1.0, |u| {
@@ -67,7 +66,7 @@ impl Radial {
     }
 }
 
-/// The zero of a function that returns value and slope; `None` where the slope is not positive.
+/// The zero of a function that returns value and slope; `None` if the slope is not positive or the steps do not converge.
 pub(super) fn newton(start: f64, value_and_slope: impl Fn(f64) -> (f64, f64)) -> Option<f64> {
     let mut x = start;
     let mut step = f64::INFINITY;
@@ -85,7 +84,7 @@ pub(super) fn newton(start: f64, value_and_slope: impl Fn(f64) -> (f64, f64)) ->
     (step.abs() < ACCEPTABLE).then_some(x)
 }
 
-/// The vector made unit; one that already is stays bit for bit as it is, so that this can be repeated.
+/// Normalises a vector; a unit vector is returned bit for bit, so that repeating this changes nothing.
 pub(super) fn made_unit(vector: Vector3) -> Vector3 {
     let length_squared = vector.norm_squared();
     if (length_squared - 1.0).abs() <= 8.0 * f64::EPSILON { vector } else { vector / length_squared.sqrt() }

@@ -1,8 +1,8 @@
-//! The mast: where the head's cameras are in the rover, and which angles aim them at a point.
+//! The mast: the poses of the head's cameras in the rover frame, and the angles that aim them at a point.
 //!
-//! Head attitude in the rover frame (x forward, y right, z down): `Rz(azimuth) Ry(elevation)`, no roll;
-//! azimuth to the right, elevation up (domain.md 4.1). The head frame's origin is where the pan and tilt
-//! axes meet; the cameras sit 15 cm above it and 10 cm beside, so panning moves them.
+//! Head attitude in the rover frame (x forward, y right, z down): `Rz(azimuth) Ry(elevation)`, no roll; azimuth to
+//! the right, elevation up (domain.md 4.1). The head frame's origin is the intersection of the pan and tilt axes; the
+//! cameras are 15 cm above it and 10 cm beside, so panning moves them.
 //!
 //! Pointing in closed form (domain.md 4.4), with C_h, u the ray of the left image's centre in the head
 //! frame and d the point seen from the mast's origin, m:
@@ -15,9 +15,9 @@
 //!
 //! Aiming the head's x axis at the point instead is wrong by 28 px at 8 m and more than 100 px near 2 m.
 //!
-//! An error of the angles turns a located point about the axes through the origin o. With the pan axis z, the tilt axis
-//! `y' = Rz(az) y` and the standard deviation σ of each angle, independent of the other, the covariance of a point p is
-//! `σ² (a aᵀ + e eᵀ)`, `a = z × (p − o)`, `e = y' × (p − o)`, to first order.
+//! An error of the angles rotates a located point about the axes through the origin o. With the pan axis z, the tilt
+//! axis `y' = Rz(az) y` and the standard deviation σ of each angle, independent of the other, the covariance of a
+//! point p is `σ² (a aᵀ + e eᵀ)`, `a = z × (p − o)`, `e = y' × (p − o)`, to first order.
 //!
 //! For CAHVORE, C_h is the entrance pupil of that ray. The mast's limits belong to the rover, not here.
 
@@ -28,7 +28,7 @@ use utoipa::ToSchema;
 use super::{Cahv, Cahvor, Camera, CameraModel};
 use crate::frames::{Point3, Pose, Vector3, attitude_from_roll_pitch_yaw};
 
-/// Where the mast's head points.
+/// The pointing of the mast's head.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct MastAngles {
     /// Clockwise seen from above, zero along the rover's +x, rad.
@@ -40,7 +40,7 @@ pub struct MastAngles {
 /// A pan and tilt mast with a stereo pair in its head.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Mast {
-    /// Where the pan and tilt axes meet, in the rover frame, m.
+    /// Intersection of the pan and tilt axes, in the rover frame, m.
     #[schema(value_type = [f64; 3])]
     pub origin_in_rover: Point3,
     /// The left camera in the head frame.
@@ -91,8 +91,8 @@ impl Mast {
         (self.left_in_head.moved(&rover_from_head), self.right_in_head.moved(&rover_from_head))
     }
 
-    /// Covariance of a point that was located by the cameras, from the error of the angles alone, rover frame, m²; each
-    /// angle has the standard deviation `sigma_rad`.
+    /// Covariance of a point located by the cameras, from the error of the angles alone, rover frame, m²; each angle
+    /// has the standard deviation `sigma_rad`.
     pub fn pointing_covariance(
         &self,
         angles: MastAngles,
@@ -107,10 +107,10 @@ impl Mast {
         sum * (sigma_rad * sigma_rad)
     }
 
-    /// The angles that put a point (rover frame, m) on the centre of the left image.
+    /// The angles that bring a point (rover frame, m) to the centre of the left image.
     ///
-    /// Azimuth lies in (−π, π]. `None` when the point is nearer to the mast than the ray passes, or right
-    /// above or below where the head cannot tilt to.
+    /// Azimuth is in (−π, π]. `None` if the point is nearer to the mast than the ray passes, or so steeply above or
+    /// below that no tilt reaches it.
     pub fn point_left_centre_at(&self, point_in_rover: &Point3) -> Option<MastAngles> {
         let ray = self.left_in_head.ray(self.left_in_head.centre_pixel())?;
         let (c, u) = (ray.origin.coords, ray.direction);
@@ -130,7 +130,7 @@ impl Mast {
     }
 }
 
-/// The angle within (−π, π], rad.
+/// Wraps an angle to (−π, π], rad.
 fn wrapped(angle_rad: f64) -> f64 {
     use std::f64::consts::{PI, TAU};
     let turned = angle_rad.rem_euclid(TAU);
@@ -164,7 +164,8 @@ mod tests {
         let mast = Mast::spirit();
         let point = Point3::new(1.9, 1.2, 0.1);
         let angles = mast.point_left_centre_at(&point).unwrap();
-        // What the told pose makes of a point that the true head sees: told · true⁻¹ · p, differentiated by both angles.
+        // The position that the reported pose gives a point of the true head: reported · true⁻¹ · p, differentiated
+        // by both angles.
         let located = |azimuth_rad: f64, elevation_rad: f64| {
             let turned = MastAngles {
                 azimuth_rad: angles.azimuth_rad + azimuth_rad,

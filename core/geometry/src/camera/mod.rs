@@ -17,13 +17,12 @@
 //! | hs, hc, vs, vc, θ | [`ImagePlane`] | px, rad | scales, principal point and angle of the image axes |
 //! | H' (K's H_x) | `horizontal_axis()` | – | unit x axis of the image plane |
 //!
-//! All vectors of one model are in one frame, whichever the model was given in; [`CameraModel::moved`]
-//! carries it to another. A model describes the image it comes with: subframes and reduced images have
-//! their own H and V (`motion`).
+//! All vectors of one model are in the frame in which the model was given; [`CameraModel::moved`] transforms it to
+//! another. A model describes one image: subframes and reduced images have their own H and V (`motion`).
 //!
-//! **O is made unit on reading** (`normalised`), because labels carry six digits and with O as printed a
-//! projected ray misses its pixel by up to 2e-4 px; C, A, H and V stay as printed. Deserialising keeps all
-//! numbers as printed: call [`CameraModel::normalised`] after it. Rays always have unit direction.
+//! **O is made unit on reading** (`normalised`), because labels have six digits and with O as printed a projected ray
+//! misses its pixel by up to 2e-4 px; C, A, H and V stay as printed. Deserialising keeps all numbers as printed: call
+//! [`CameraModel::normalised`] after it. Rays always have unit direction.
 //!
 //! Sources: Yakimovsky & Cunningham 1978 (CAHV); Gennery 2006 (CAHVOR, CAHVORE); NASA-AMMOS/VICAR
 //! `cmod_cahv*.c`; Kim et al. Eq. 7–9 (H'). Formulas: domain.md section 2.
@@ -51,10 +50,10 @@ pub use name::CameraName;
 
 use crate::frames::{Pixel, Point3, Ray, Vector3};
 
-/// Where the effective focal length is measured, m: so far that the movement of the pupil does not count.
+/// Distance at which the effective focal length is measured, m: the movement of the pupil is negligible there.
 const REMOTE_M: f64 = 1e4;
 
-/// One camera model of the CAHV family; its vectors are in the frame it was given in.
+/// One camera model of the CAHV family; its vectors are in the frame in which it was given.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "model")]
 pub enum CameraModel {
@@ -72,7 +71,7 @@ pub enum CameraModel {
 impl CameraModel {
     /// The pixel of a point (m, in the model's frame), inside the image or not.
     ///
-    /// `None` when the point is behind the camera or outside the model's domain.
+    /// `None` if the point is behind the camera or outside the model's domain.
     pub fn project(&self, point: &Point3) -> Option<Pixel> {
         match self {
             Self::Cahv(model) => model.project(point),
@@ -81,7 +80,7 @@ impl CameraModel {
         }
     }
 
-    /// The pixel of a point (m) and the derivative of (x, y) by the point, px/m; analytic.
+    /// The pixel of a point (m) and the derivative of (x, y) with respect to the point, px/m; analytic.
     pub fn project_with_jacobian(&self, point: &Point3) -> Option<(Pixel, Matrix2x3<f64>)> {
         match self {
             Self::Cahv(model) => model.project_with_jacobian(point),
@@ -90,7 +89,7 @@ impl CameraModel {
         }
     }
 
-    /// The ray of a pixel in the model's frame; `None` where the distortion cannot be undone.
+    /// The ray of a pixel in the model's frame; `None` if the distortion has no inverse there.
     pub fn ray(&self, pixel: Pixel) -> Option<Ray> {
         match self {
             Self::Cahv(model) => model.ray(pixel),
@@ -108,7 +107,7 @@ impl CameraModel {
         }
     }
 
-    /// The linear part, to change.
+    /// The linear part, mutable.
     fn linear_mut(&mut self) -> &mut Cahv {
         match self {
             Self::Cahv(model) => model,
@@ -148,7 +147,7 @@ impl CameraModel {
 
     /// Effective pixels per radian at a pixel, the mean of the x and y directions (domain.md 2.6).
     ///
-    /// Not hs: with a distortion whose r0 is not zero, H and V alone do not tell the scale.
+    /// Not hs: with a distortion whose r0 is not zero, H and V alone do not determine the scale.
     pub fn focal_length_px(&self, pixel: Pixel) -> Option<f64> {
         let ray = self.ray(pixel)?;
         let (_, jacobian) = self.project_with_jacobian(&ray.at(REMOTE_M))?;
@@ -171,9 +170,9 @@ impl CameraModel {
         }
     }
 
-    /// Whether the numbers can be a camera: finite, |A| and |O| within 0.1 of 1, hs and vs positive.
+    /// Checks that the numbers describe a camera: finite, |A| and |O| within 0.1 of 1, hs and vs positive.
     ///
-    /// The error is a sentence that names the vector at fault.
+    /// The error is a sentence that names the invalid vector.
     pub fn validate(&self) -> Result<(), String> {
         self.linear().validate()?;
         match self {
@@ -187,7 +186,7 @@ impl CameraModel {
 /// A camera model with the size of its image.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Camera {
-    /// The model, which fits an image of exactly this size.
+    /// The model of an image of exactly this size.
     #[serde(flatten)]
     pub model: CameraModel,
     /// Width and height, px.
@@ -215,7 +214,7 @@ impl Camera {
         Pixel::new((f64::from(self.width()) - 1.0) / 2.0, (f64::from(self.height()) - 1.0) / 2.0)
     }
 
-    /// The pixel of a point (m), inside the image or not; `None` only when the model says so.
+    /// The pixel of a point (m), inside the image or not; `None` only outside the model's domain.
     pub fn project(&self, point: &Point3) -> Option<Pixel> {
         self.model.project(point)
     }

@@ -1,14 +1,14 @@
-//! What can be done to a camera model exactly: carry it by a rigid motion, cut its image, reduce its image.
+//! Exact operations on a camera model: a rigid motion, a subframe, or a reduction of its image.
 //!
 //! ```text
 //! rigid motion (p ↦ ρ p + t): C ← ρ C + t;  A, H, V, O ← ρ ·;  R, E, T, P unchanged        domain.md 2.5
 //! subframe whose first pixel is (dx, dy) of the full image: H ← H − dx A, V ← V − dy A     domain.md 2.1
-//! mean of blocks of k × k: H ← H/k − ((k − 1)/(2k)) A, V alike                             domain.md 2.1
+//! mean of blocks of k × k: H ← H/k − ((k − 1)/(2k)) A, V likewise                        domain.md 2.1
 //! ```
 //!
-//! The last line is not H/k alone: the centre of the first block lies at (k − 1)/2 of the full image, and
-//! pixel centres are whole numbers in both. The distortion is about O, not about the image, so it stays.
-//! Source: VICAR `cmod_cahv*_move`.
+//! The last line is not H/k alone: the centre of the first block is at (k − 1)/2 of the full image, and pixel centres
+//! are whole numbers in both. The distortion is about O, independent of the image, and so unchanged. Source: VICAR
+//! `cmod_cahv*_move`.
 
 use super::{Cahv, Cahvor, Cahvore, Camera, CameraModel};
 use crate::frames::Pose;
@@ -25,7 +25,7 @@ impl Cahv {
 }
 
 impl CameraModel {
-    /// The model carried into another frame, or by a motion within one: new position from old.
+    /// Transforms the model into another frame, or by a motion within one: new position from old.
     pub fn moved(&self, to_from_here: &Pose) -> Self {
         match self {
             Self::Cahv(model) => Self::Cahv(model.moved(to_from_here)),
@@ -64,7 +64,7 @@ impl CameraModel {
 }
 
 impl Camera {
-    /// The camera carried into another frame, or by a motion within one: new position from old.
+    /// Transforms the camera into another frame, or by a motion within one: new position from old.
     pub fn moved(&self, to_from_here: &Pose) -> Self {
         Self { model: self.model.moved(to_from_here), size: self.size }
     }

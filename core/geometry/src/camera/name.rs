@@ -1,7 +1,7 @@
-//! The name of a further camera of a stop: a short identifier that files, paths and commands can contain as it is.
+//! The name of a further camera of a stop: a short identifier that is valid in files, paths and commands.
 //!
-//! The main pair of a stop has no name. A name has 1 to 32 characters of `a` to `z`, `0` to `9` and `_`; it is checked when
-//! it is read, so that a [`CameraName`] is valid wherever there is one.
+//! The main pair of a stop has no name. A name has 1 to 32 characters of `a` to `z`, `0` to `9` and `_`; it is
+//! checked when it is read, so that every [`CameraName`] is valid.
 
 use std::fmt;
 use std::str::FromStr;
@@ -9,7 +9,7 @@ use std::str::FromStr;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use utoipa::ToSchema;
 
-/// The most characters of a name.
+/// Largest number of characters of a name.
 const LENGTH_LIMIT: usize = 32;
 
 /// The name of a further camera of a stop, for example `front_hazcam`.
@@ -21,7 +21,7 @@ pub struct CameraName(
 );
 
 impl CameraName {
-    /// The pair that visual odometry takes of its own.
+    /// The stereo pair taken for visual odometry.
     pub const ODOMETRY: Self = Self(*b"odometry\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0");
 
     /// The name as text.

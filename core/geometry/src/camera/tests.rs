@@ -142,7 +142,7 @@ fn the_cameras_of_the_scale_and_roll_vector_agree_with_the_reference() {
     assert_near((target - new.model.centre()).norm(), number(&case["D_new"]), 1e-9);
 }
 
-/// A mast of the reference vectors, as printed; Opportunity has no right eye, so its left one stands in.
+/// A mast of the reference vectors, as printed; Opportunity has no right camera, so its left one is used for both.
 fn printed_mast(case: &Value) -> Mast {
     let camera = |name: &str| {
         let head = if case[name].is_null() { &case["head_left"] } else { &case[name] };
@@ -282,7 +282,7 @@ fn points_behind_a_camera_are_rejected() {
     for camera in all_kinds() {
         for pixel in pixel_grid(&camera) {
             let ray = camera.ray(pixel).unwrap();
-            // Opposite to the corners of a hazcam there is still a little of its field of view.
+            // Directions opposite to the corners of a hazcam are still slightly inside its field of view.
             if ray.direction.dot(&camera.model.optical_axis()) < 70_f64.to_radians().cos() {
                 continue;
             }
@@ -300,7 +300,7 @@ fn points_behind_a_camera_are_rejected() {
 
 #[test]
 fn points_beyond_the_fold_of_a_distortion_are_rejected() {
-    // With R = (0, −0.1, 0) the seen radius turns back at the tangent √(10/3), 61.3° off the axis.
+    // With R = (0, −0.1, 0) the distorted radius turns back at the tangent √(10/3), 61.3° off the axis.
     let [linear, ..] = all_kinds();
     let linear = linear.model.linear().clone();
     let (axis, across) = (linear.axis.normalize(), linear.horizontal_axis().normalize());

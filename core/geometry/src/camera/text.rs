@@ -7,11 +7,11 @@
 //! C = x y z
 //! ```
 //!
-//! and then A, H, V, O, R, E alike (m, px and unit as in the module's table); `CAHVORE1` is perspective,
-//! `CAHVORE2` fisheye, `CAHVORE3,P` general; CAHV and CAHVOR have no number. Spaces are free, numbers may
-//! go on in the next line, and unknown keys are skipped: the covariances `S`, `S internal` and the derived
-//! `Hs`, `Hc`, `Vs`, `Vc`, `Theta` are not kept. Written numbers have all the digits of an f64.
-//! Source: domain.md 2.7; VICAR `cmod_stdio_cahvore.c`.
+//! and then A, H, V, O, R, E likewise (m, px and unit as in the module's table); `CAHVORE1` is perspective,
+//! `CAHVORE2` fisheye, `CAHVORE3,P` general; CAHV and CAHVOR have no number. Spaces are free, numbers may continue in
+//! the next line, and unknown keys are skipped: the covariances `S`, `S internal` and the derived `Hs`, `Hc`, `Vs`,
+//! `Vc`, `Theta` are not kept. Numbers are written with all digits of an f64. Source: domain.md 2.7; VICAR
+//! `cmod_stdio_cahvore.c`.
 
 use std::collections::HashMap;
 use std::fmt::Write;
@@ -21,7 +21,7 @@ use super::{Cahv, Cahvor, Cahvore, Camera, CameraModel, Imaging};
 use crate::error::{Error, Result};
 use crate::frames::Point3;
 
-/// The keys whose values make the camera.
+/// The keys that define the camera.
 const KEYS: [&str; 9] = ["Model", "Dimensions", "C", "A", "H", "V", "O", "R", "E"];
 
 /// Reads a text camera file; O is made unit.
@@ -31,12 +31,12 @@ pub fn read_text(text: &str, origin: &Path) -> Result<Camera> {
     Ok(read_text_as_printed(text, origin)?.normalised())
 }
 
-/// Reads a text camera file and leaves its vectors as printed.
+/// Reads a text camera file, with its vectors as printed.
 pub fn read_text_as_printed(text: &str, origin: &Path) -> Result<Camera> {
     read(text).map_err(|problem| Error::format(origin, problem))
 }
 
-/// Writes a camera as text; reading it gives the same numbers bit for bit (when O is unit).
+/// Writes a camera as text; reading it returns the same numbers bit for bit (if O is unit).
 pub fn write_text(camera: &Camera) -> String {
     let linear = camera.model.linear();
     let mut text = String::new();
@@ -75,7 +75,7 @@ fn model_line(model: &CameraModel) -> String {
                 Imaging::Fisheye => "fish-eye",
                 Imaging::General => "general",
             };
-            // The parameter means nothing for the other two laws, but it is kept where it was given.
+            // The parameter is unused in the other two laws, but it is kept if it was given.
             let parameter = match (model.imaging, model.linearity_parameter) {
                 (Imaging::Perspective | Imaging::Fisheye, 0.0) => String::new(),
                 (_, parameter) => format!(",{parameter}"),
@@ -93,13 +93,13 @@ fn vector_line(name: &str, numbers: &[f64]) -> String {
     })
 }
 
-/// The value of a key, with the number of the line where it begins.
+/// The value of a key, with the number of its first line.
 struct Entry {
     line: usize,
     value: String,
 }
 
-/// The kind of model that the first line announces.
+/// The kind of model given in the first line.
 enum Kind {
     Cahv,
     Cahvor,
@@ -132,7 +132,7 @@ fn read(text: &str) -> Result<Camera, String> {
     Ok(Camera { model, size })
 }
 
-/// All `key = value` lines; a line without `=` goes on with the value before it.
+/// All `key = value` lines; a line without `=` continues the value before it.
 fn entries(text: &str) -> Result<HashMap<String, Entry>, String> {
     let mut entries: HashMap<String, Entry> = HashMap::new();
     let mut last: Option<String> = None;
@@ -187,7 +187,7 @@ fn size(Entry { line, value }: &Entry) -> Result<[u32; 2], String> {
 }
 
 fn kind(Entry { line, value }: &Entry) -> Result<Kind, String> {
-    // What follows a second "=" is a description for people.
+    // Text after a second "=" is a description for people.
     let name = value.split('=').next().unwrap_or_default().replace(char::is_whitespace, "");
     let (family, parameter) = name.split_once(',').unwrap_or((&name, ""));
     let imaging = match (family, parameter) {

@@ -1,19 +1,19 @@
-//! How well a motion is known, from the matches that it was fitted to (D§2, R173–R175, D-Eq 5; domain.md 13.3).
+//! The covariance of a motion, by a bootstrap over its inliers (D§2, R173–R175, D-Eq 5; domain.md 13.3).
 //!
 //! ```text
 //! n_boot times: draw |J_in| of the matches J_in with replacement, fit the motion θ^b
 //! P_θθ = 1/n_boot Σ_b (θ^b − θ*)(θ^b − θ*)ᵀ        about θ*, not about the mean; angles wrapped (E30)
 //! ```
 //!
-//! A set with fewer than three different matches, or with all on a line, is drawn again (ours). A fit needs only how
-//! often each match was drawn, so sums that do not depend on the draw are formed once. The unweighted fit is Horn's. The
-//! weighted one is a single step of Gauss–Newton from θ*: with a motion that is uncertain by milliradians, further steps
-//! change it by a few thousandths of its error.
+//! A set with fewer than three different matches, or with all on a line, is drawn again (ours). A fit depends only on
+//! how often each match was drawn, so sums that do not depend on the draw are computed once. The unweighted fit is
+//! Horn's. The weighted one is a single Gauss–Newton step from θ*: for a motion with an uncertainty of milliradians,
+//! further steps change it by a few thousandths of its error.
 //!
-//! The covariance is that of repeated experiments with points of their own. Where one direction is known ten times
-//! better than the others, as the roll of stereo points fitted without weights (errors along the lines of sight do not
-//! turn the points about them), a drawn set mixes the directions a little: that variance then comes out half as large
-//! again with 150 matches.
+//! The covariance is that of repeated experiments with points of their own. If one direction is ten times more
+//! accurate than the others, such as the roll of stereo points fitted without weights (errors along the lines of
+//! sight do not rotate the points about them), a drawn set mixes the directions slightly: with 150 matches that
+//! variance is overestimated by half.
 //!
 //! | symbol | our name | unit, frame |
 //! |---|---|---|
@@ -33,20 +33,20 @@ use super::ransac::Weighting;
 use super::weighted_motion::{Correspondence, Loss, Normal, followed_by};
 use crate::frames::{Point3, Pose, Vector3};
 
-/// How often a set is drawn again before the matches are taken to be unfit for it.
+/// Number of times that a set is drawn again before the bootstrap fails.
 const TRIES: u32 = 50;
 
-/// How the matches are drawn and fitted.
+/// Settings of the bootstrap.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct BootstrapSettings {
-    /// n_boot. Too few: a noisy covariance; the standard deviations scatter by 1/√(2 n_boot).
+    /// n_boot. Too few: a noisy covariance; the standard deviations have a relative error of 1/√(2 n_boot).
     pub sets: u32,
-    /// How matches count: as in the fit that is examined.
+    /// Weighting of the matches, as in the examined fit.
     pub weighting: Weighting,
-    /// How their weight falls off with the residual, where they are weighted.
+    /// Robust loss of the residuals, with weighting by range.
     pub loss: Loss,
-    /// Of the draws.
+    /// Seed of the draws.
     pub seed: u64,
 }
 
@@ -57,10 +57,10 @@ impl Default for BootstrapSettings {
     }
 }
 
-/// A motion's scatter.
+/// The uncertainty of a motion.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Bootstrap {
-    /// θ*: the motion that is examined.
+    /// θ*: the examined motion.
     pub parameters: MotionParameters,
     /// P_θθ of x, y, z (m), roll, pitch, yaw (rad), by columns.
     #[schema(value_type = Vec<f64>)]
@@ -69,16 +69,16 @@ pub struct Bootstrap {
     pub samples: Vec<[f64; 6]>,
 }
 
-/// The motions of the drawn sets, by what is common to all draws.
+/// Fits the drawn sets, using sums common to all draws.
 enum Refitter {
-    /// Offsets of the matches from two places, for Horn's sums.
+    /// Offsets of the matches from two fixed points, for Horn's sums.
     Plain { from: Point3, to: Point3, offsets: Vec<(Vector3, Vector3)> },
-    /// Each match's share in the normal equations at θ*.
+    /// The contribution of each match to the normal equations at θ*.
     Weighted { motion: Pose, about: Point3, shares: Vec<Normal> },
 }
 
 impl Refitter {
-    /// None when a match cannot be weighted.
+    /// `None` if a match cannot be weighted.
     fn new(inliers: &[Correspondence], motion: &Pose, settings: &BootstrapSettings) -> Option<Self> {
         let (from, to) = (inliers.first()?.before, inliers.first()?.after);
         Some(match settings.weighting {
@@ -96,7 +96,7 @@ impl Refitter {
         })
     }
 
-    /// The motion of the matches drawn `times` each; none when they do not determine one.
+    /// Fits the matches, each drawn `times`; `None` if they do not determine a motion.
     fn refit(&self, times: &[u32]) -> Option<Pose> {
         match self {
             Self::Plain { from, to, offsets } => {
@@ -118,10 +118,10 @@ impl Refitter {
     }
 }
 
-/// The covariance of a motion by the matches that agree with it.
+/// Computes the covariance of a motion from its inliers.
 ///
-/// None when they are fewer than three, when they determine the motion in hardly any drawn set, or when a covariance
-/// that is to weight them has no inverse.
+/// `None` for fewer than three inliers, if hardly any drawn set determines the motion, or if a covariance that gives
+/// a weight has no inverse.
 pub fn bootstrap(
     inliers: &[Correspondence],
     after_from_before: &Pose,
@@ -131,10 +131,11 @@ pub fn bootstrap(
     block_bootstrap(inliers, &blocks, after_from_before, settings)
 }
 
-/// The same where the errors of neighbours are alike: whole blocks are drawn, `blocks` says to which a match belongs.
+/// As [`bootstrap`], for correlated errors of neighbours: whole blocks are drawn; `blocks` has the block of each match.
 ///
-/// Features of one stone err alike, so that they are fewer observations than they seem (the block bootstrap of Künsch
-/// 1989, in the plane). The number of matches in a set then varies about theirs. None as for [`bootstrap`].
+/// Features of one stone have correlated errors, so that they are fewer independent observations than their number
+/// (the block bootstrap of Künsch 1989, in the plane). The number of matches in a set then varies. `None` as for
+/// [`bootstrap`].
 pub fn block_bootstrap(
     inliers: &[Correspondence],
     blocks: &[u32],
@@ -169,7 +170,7 @@ pub fn block_bootstrap(
     Some(Bootstrap { parameters, covariance, samples })
 }
 
-/// Draws as many blocks as there are, with replacement: how often each was drawn.
+/// Draws as many blocks as there are, with replacement; counts how often each was drawn.
 fn draw(times: &mut [u32], random: &mut Pcg64) {
     times.fill(0);
     for _ in 0..times.len() {

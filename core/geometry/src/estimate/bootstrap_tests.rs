@@ -36,7 +36,7 @@ fn ratios(weighting: Weighting, is_stereo: bool) -> [f64; 6] {
 
 #[test]
 fn its_variances_are_those_of_repeated_experiments() {
-    // A variance over 600 experiments is known to 6 % (1σ).
+    // A variance over 600 experiments has a standard deviation of 6 %.
     for (weighting, is_stereo) in [(Weighting::None, false), (Weighting::Range, true)] {
         let ratios = ratios(weighting, is_stereo);
         println!("{weighting:?}: {ratios:.3?}");

@@ -1,11 +1,11 @@
-//! A target carried into the next frame by an uncertain motion (D§2, R168, R176, R177; D-Eq 3 and 6).
+//! Carries a target into the next frame by an uncertain motion (D§2, R168, R176, R177; D-Eq 3 and 6).
 //!
 //! ```text
 //! x' = T(θ) x        inputs (x, P_xx) and (θ*, P_θθ), independent: an unscented transform of 9 dimensions
 //! ```
 //!
-//! Tracking that goes from stop to stop adds the motion's uncertainty each time, so the eigenvalues of P_xx do not
-//! shrink; single axes may, since the frame turns with the rover (E29).
+//! Tracking from stop to stop adds the motion's uncertainty each time, so the eigenvalues of P_xx do not shrink;
+//! single axes may, since the frame rotates with the rover (E29).
 //!
 //! | symbol | our name | unit, frame |
 //! |---|---|---|
@@ -19,7 +19,7 @@ use super::motion_parameters::MotionParameters;
 use super::unscented::{UnscentedParameters, unscented};
 use crate::frames::Point3;
 
-/// Position and covariance after the motion; none when a covariance is not positive semidefinite.
+/// Position and covariance after the motion; `None` if a covariance is not positive semidefinite.
 pub fn carry(
     position: &Point3,
     position_covariance: &Matrix3<f64>,

@@ -1,28 +1,28 @@
-//! How far a motion is to be trusted, by the number of matches that agree on it (D§2, R182, R183).
+//! Confidence in a motion, from its number of inliers (D§2, R182, R183).
 //!
 //! ```text
 //! conf = 1 / (1 + exp(a (n_conf − |J_in|)))
 //! ```
 //!
-//! The paper prints the exponent with the other sign, which would trust few matches and distrust many, against its own
-//! text (E23).
+//! The paper prints the exponent with the opposite sign, which would trust few matches and distrust many, contrary to
+//! its own text (E23).
 //!
 //! | symbol | our name | unit |
 //! |---|---|---|
-//! | J_in | `inliers`: how many | – |
+//! | J_in | number `inliers` | – |
 //! | n_conf | [`ConfidenceSettings::inliers_for_half`] | – |
 //! | a | [`ConfidenceSettings::slope`] | 1 per match |
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// Where and how steeply the confidence rises.
+/// Midpoint and slope of the confidence.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ConfidenceSettings {
-    /// n_conf: matches that give a confidence of one half.
+    /// n_conf: number of inliers with a confidence of one half.
     pub inliers_for_half: f64,
-    /// a: how steeply it rises there, per match.
+    /// a: steepness of the confidence, per match.
     pub slope: f64,
 }
 
@@ -33,7 +33,7 @@ impl Default for ConfidenceSettings {
     }
 }
 
-/// The confidence, 0 to 1, in a motion on which so many matches agree.
+/// The confidence, 0 to 1, in a motion with this number of inliers.
 pub fn confidence(inliers: usize, settings: ConfidenceSettings) -> f64 {
     1.0 / (1.0 + (settings.slope * (settings.inliers_for_half - inliers as f64)).exp())
 }

@@ -1,17 +1,17 @@
-//! The error of a target's pixel that grows as matches are chained: each template is cut where the last match
-//! fell (ours).
+//! The error of a target's pixel, which grows as matches are chained: each template is cut at the position of the
+//! last match (ours).
 //!
-//! A match k adds an error `e_k = S_k u_k + b_k`: S_k is the symmetric square root of the match's covariance, u_k
-//! has unit covariance, and b_k is the bias that the surface's slope explains. What disturbs a match (relief in
-//! the window, a facet at its border) is still there at the next stop, seen little differently. So the u_k are
-//! alike from one match to the next: a first-order Gauss–Markov sequence with `E[u_k u_{k−1}ᵀ] = ρ I`. With A_k, the
-//! image's magnification and roll since the last stop, the drift `d_k = A_k d_{k−1} + S_k u_k` has
+//! A match k adds an error `e_k = S_k u_k + b_k`: S_k is the symmetric square root of the match's covariance, u_k has
+//! unit covariance, and b_k is the bias explained by the surface's slope. The cause of an error (relief in the
+//! window, a facet at its border) is still present at the next stop and looks almost the same. So consecutive u_k are
+//! correlated: a first-order Gauss–Markov sequence with `E[u_k u_{k−1}ᵀ] = ρ I`. With A_k, the image's magnification
+//! and roll since the last stop, the drift `d_k = A_k d_{k−1} + S_k u_k` has
 //! ```text
 //! G_k = ρ A_k G_{k−1} + S_k                                          G = E[d uᵀ]
 //! D_k = A_k D_{k−1} A_kᵀ + S_k S_kᵀ + ρ (A_k G_{k−1} S_kᵀ + S_k G_{k−1}ᵀ A_kᵀ)
 //! b_k ← A_k b_{k−1} + b_k
 //! ```
-//! With ρ = 0 the matches' covariances add up, as if each stop had a fresh error.
+//! With ρ = 0 the matches' covariances add up, as if the errors of all stops were independent.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -32,22 +32,22 @@ pub struct Drift {
     /// Covariance, px².
     #[schema(value_type = Vec<f64>)]
     pub covariance_px2: Matrix2<f64>,
-    /// The part that points the same way step after step, px.
+    /// The part with the same direction step after step, px.
     #[schema(value_type = [f64; 2])]
     pub bias_px: Vector2<f64>,
-    /// Covariance with the normalised error of the last match, px.
+    /// Cross-covariance with the normalised error of the last match, px.
     #[schema(value_type = Vec<f64>)]
     pub with_last_match_px: Matrix2<f64>,
 }
 
 impl Drift {
-    /// The error of a pixel that was not matched, but chosen or assumed.
+    /// The error of a pixel that was chosen or assumed, not matched.
     pub fn of_pixel(covariance_px2: Matrix2<f64>) -> Self {
         Self { covariance_px2, ..Self::default() }
     }
 
-    /// The error after one more match, whose own error is `covariance_px2` and `bias_px`; `map` takes
-    /// differences of pixels from the last image to this one.
+    /// The error after one more match, whose own error is `covariance_px2` and `bias_px`; `map` maps pixel
+    /// differences in the last image to this one.
     pub fn after_match(
         &self,
         map: &Matrix2<f64>,
@@ -73,7 +73,7 @@ impl Drift {
     }
 }
 
-/// The symmetric square root of a covariance; negative eigenvalues, which only rounding makes, count as zero.
+/// The symmetric square root of a covariance; negative eigenvalues, which result from rounding, count as zero.
 fn square_root(covariance: &Matrix2<f64>) -> Matrix2<f64> {
     let mut eigen = SymmetricEigen::new(*covariance);
     eigen.eigenvalues.apply(|value| *value = value.max(0.0).sqrt());

@@ -1,4 +1,4 @@
-//! What accuracy stereo and drift leave, before anything is driven (K§4.2, K-Eq 1–5, K-Tab I, R34–R47).
+//! The error budget of stereo and drift, before a drive (K§4.2, K-Eq 1–5, K-Tab I, R34–R47).
 //!
 //! ```text
 //! ΔR_stereo(R) = R² Δd / (f_p B)                                   K-Eq 1
@@ -8,10 +8,10 @@
 //! ΔR_trk       = √( ΔR_stereo(R_1)² + ΔR_drift² )                  K-Eq 5: tracked
 //! n_min        = 0.5 R_0 / R_1                                     R40: half a pixel of the first image, seen from R_1
 //! ```
-//! All are 3σ values, since Δd = 1 px is taken as one (R35). The two cameras of the paper's Table I are the test
-//! bed's, not those on Mars (R42, E35). They were computed with the maker's pixel of 4.65 µm, not with the 4.69 µm
-//! that the text derives (E3); the printed 42.0 and 2.3 cm come from inputs that had been rounded (E4), and a field of
-//! view of 49° × 37° does not follow from 6 mm (E2).
+//! All are 3σ values, since Δd = 1 px is taken as a 3σ value (R35). The two cameras of the paper's Table I are the
+//! test bed's, not those on Mars (R42, E35). The table was computed with the maker's pixel of 4.65 µm, not with the
+//! 4.69 µm derived in the text (E3); the printed 42.0 and 2.3 cm result from rounded inputs (E4), and a field of view
+//! of 49° × 37° does not follow from 6 mm (E2).
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -30,16 +30,16 @@ use crate::frames::Pixel;
 /// Instrument placement needs an error below this, m (R46).
 pub const PLACEMENT_NEED_M: f64 = 0.03;
 
-/// Pixel size of the paper's example cameras by their maker, µm: the one that Table I was computed with (R42, E3).
+/// Pixel size of the paper's example cameras by their maker, µm; Table I was computed with it (R42, E3).
 pub const MAKER_PIXEL_UM: f64 = 4.65;
 
-/// Pixel size that the paper's text derives, 4.8 mm over 1024 pixels, µm (R42).
+/// Pixel size derived in the paper's text, 4.8 mm over 1024 pixels, µm (R42).
 pub const DERIVED_PIXEL_UM: f64 = 4.6875;
 
-/// Pixels of the example cameras (R42).
+/// Image size of the example cameras, px (R42).
 const EXAMPLE_SIZE_PX: [f64; 2] = [1024.0, 768.0];
 
-/// Two cameras side by side, as far as the budget knows them.
+/// Two cameras side by side, with the parameters that the budget needs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct StereoPair {
     /// Focal length, px.
@@ -48,7 +48,7 @@ pub struct StereoPair {
     pub baseline_m: f64,
 }
 
-/// A drive towards a target and what goes wrong on it.
+/// A drive towards a target, with its error sources.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Approach {
     /// Distance at designation, m.
@@ -59,12 +59,12 @@ pub struct Approach {
     pub disparity_error_px: f64,
     /// Error of navigation as a fraction of the distance driven.
     pub navigation_fraction: f64,
-    /// What tracking drifted by, px.
+    /// Drift of the tracking, px.
     pub drift_px: f64,
 }
 
 impl Default for Approach {
-    /// The paper's: 10 m to 2 m, one pixel, 2 %, and 10 pixels of drift (R35, R37, R38, R45).
+    /// The paper's values: 10 m to 2 m, one pixel, 2 %, and 10 pixels of drift (R35, R37, R38, R45).
     fn default() -> Self {
         Self { start_m: 10.0, end_m: 2.0, disparity_error_px: 1.0, navigation_fraction: 0.02, drift_px: 10.0 }
     }
@@ -73,28 +73,28 @@ impl Default for Approach {
 /// The budget of an approach: 3σ errors, m.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ErrorBudget {
-    /// Of the designation along the line of sight: K-Eq 1 at the start.
+    /// Error of the designation along the line of sight: K-Eq 1 at the start.
     pub designation_m: f64,
-    /// At the end without tracking: K-Eq 3.
+    /// Error at the end without tracking: K-Eq 3.
     pub without_tracking_m: f64,
-    /// Of stereo at the end: K-Eq 1 there.
+    /// Error of stereo at the end: K-Eq 1.
     pub stereo_m: f64,
-    /// Of one pixel of drift at the end: K-Eq 4.
+    /// Error of one pixel of drift at the end: K-Eq 4.
     pub drift_per_px_m: f64,
-    /// At the end with tracking: K-Eq 5.
+    /// Error at the end with tracking: K-Eq 5.
     pub with_tracking_m: f64,
-    /// The drift that half a pixel of the first image is at the end, px (R40): tracking cannot do better.
+    /// Drift at the end by half a pixel of the first image, px (R40): the lower bound of tracking.
     pub least_drift_px: f64,
 }
 
 impl StereoPair {
-    /// A pair by its lens and its detector: K-Eq 2.
+    /// A pair from its lens and its detector: K-Eq 2.
     pub fn from_lens(focal_mm: f64, pixel_um: f64, baseline_m: f64) -> Self {
         Self { focal_px: focal_mm * 1000.0 / pixel_um, baseline_m }
     }
 
-    /// A pair of real cameras, whose focal length is the effective one at `pixel` of the left; none where the model
-    /// does not reach that pixel.
+    /// A pair of real cameras, with the effective focal length at `pixel` of the left one; `None` if the model has no
+    /// ray there.
     pub fn from_cameras(left: &Camera, right: &Camera, pixel: Pixel) -> Option<Self> {
         let baseline_m = (right.model.centre() - left.model.centre()).norm();
         Some(Self { focal_px: left.model.focal_length_px(pixel)?, baseline_m })
@@ -137,7 +137,7 @@ impl StereoPair {
     }
 }
 
-/// One camera pair of the paper's Table I with what the paper prints for it.
+/// One camera pair of the paper's Table I with its printed values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TableOneRow {
     /// The paper's name of the pair.

@@ -1,6 +1,6 @@
 //! The rigid motion between two sets of matched points, in closed form (Horn 1987; R163, E33; domain.md 13.1).
 //!
-//! Wanted are R and t with the least Σ w |q − R p − t|². With p' = p − p̄ and q' = q − q̄ about the weighted centroids
+//! Minimises Σ w |q − R p − t|² over R and t. With p' = p − p̄ and q' = q − q̄ about the weighted centroids
 //!
 //! ```text
 //! S = Σ w p' q'ᵀ
@@ -12,10 +12,10 @@
 //! t = q̄ − R p̄
 //! ```
 //!
-//! A quaternion is never a reflection. With the singular values σ1 ≥ σ2 ≥ σ3 of S (σ3 negative for
-//! mirrored sets) the two largest eigenvalues of N are σ1 + σ2 + σ3 and σ1 − σ2 − σ3. Half their difference over Σw is
-//! the mean square spread across the main axis: where the two meet, the turn about it is free. The spread is taken
-//! from N rather than from one set, because noise, which the two sets do not share, then does not pass for spread.
+//! A quaternion is never a reflection. With the singular values σ1 ≥ σ2 ≥ σ3 of S (σ3 negative for mirrored sets) the
+//! two largest eigenvalues of N are σ1 + σ2 + σ3 and σ1 − σ2 − σ3. Half their difference over Σw is the mean square
+//! spread across the main axis: if the two are equal, the rotation about it is undetermined. The spread is computed
+//! from N rather than from one set, so that noise, which the two sets do not share, does not count as spread.
 //!
 //! | symbol | our name | unit, frame |
 //! |---|---|---|
@@ -28,27 +28,27 @@ use nalgebra::{Matrix3, Matrix4, Quaternion, SymmetricEigen, Translation3, UnitQ
 
 use crate::frames::{Point3, Pose, Vector3};
 
-/// Least spread across the main axis, root mean square, m: that of a triangle whose altitude is 2 cm (domain.md 13.1).
-/// Below it noise of a few millimetres turns the motion by tens of degrees about the axis.
+/// Smallest spread across the main axis, root mean square, m: that of a triangle with an altitude of 2 cm (domain.md
+/// 13.1). Below it, noise of a few millimetres rotates the motion by tens of degrees about the axis.
 pub const ACROSS_MIN_M: f64 = 0.01;
-/// Spread below which points are one point, m.
+/// Spread below which points count as identical, m.
 const IDENTICAL_M: f64 = 1e-6;
 
 /// Why points do not determine a motion; its text is a sentence for a person.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Degenerate {
-    /// Three are needed.
+    /// Three matches are needed.
     #[error("there are fewer than three matches ({matches})")]
     TooFew {
-        /// How many there were.
+        /// Number of matches.
         matches: usize,
     },
-    /// The two sets, or the sets and their weights, are not of one length.
+    /// The two sets, or the sets and their weights, differ in length.
     #[error("{before} points cannot be matched with {after}")]
     Unpaired {
-        /// Points in the one set.
+        /// Number of points of one set.
         before: usize,
-        /// Points, or weights, in the other.
+        /// Number of points, or weights, of the other.
         after: usize,
     },
     /// All matches are at one point.
@@ -60,13 +60,13 @@ pub enum Degenerate {
         /// Their spread along the main axis, m.
         along_m: f64,
     },
-    /// All matches are on or near a line, about which any turn fits.
+    /// All matches are on or near a line, so that the rotation about it is undetermined.
     #[error("all matches are on a line: their spread across it is only {across_m:.4} m (RMS)")]
     OnALine {
         /// Their spread across the line, m.
         across_m: f64,
     },
-    /// The sets have different shapes, as when one is the mirror image of the other.
+    /// The sets have different shapes, for example if one is the mirror image of the other.
     #[error(
         "the rotation is ambiguous: the matched points have different shapes before and after the motion"
     )]
@@ -79,7 +79,7 @@ pub enum Degenerate {
     Covariance,
 }
 
-/// Sums over weighted pairs of points, as offsets from a fixed place in either frame.
+/// Sums over weighted pairs of points, as offsets from a fixed point in each frame.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sums {
     weight: f64,
@@ -88,12 +88,12 @@ pub(super) struct Sums {
     products: Matrix3<f64>,
 }
 
-/// The best motion of some sums.
+/// The motion fitted to such sums.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fitted {
-    /// Between the offsets: it takes those before into those after.
+    /// The motion that maps the offsets before to those after.
     pub(super) motion: Pose,
-    /// Spread across the main axis, root mean square, m; 0 where the turn about it is free.
+    /// Spread across the main axis, root mean square, m; 0 if the rotation about it is undetermined.
     pub(super) across_m: f64,
     /// The eigenvalues of N, ascending, m².
     #[cfg(test)]
@@ -140,16 +140,16 @@ fn quaternion_form(s: &Matrix3<f64>) -> Matrix4<f64> {
     form
 }
 
-/// The motion between offsets from two places, as a motion between the frames of those places.
+/// Converts a motion between offsets from two points to a motion between the frames of those points.
 pub(super) fn between(before: &Point3, after: &Point3, motion: &Pose) -> Pose {
     let translation = after.coords + motion.translation.vector - motion.rotation * before.coords;
     Pose::from_parts(Translation3::from(translation), motion.rotation)
 }
 
-/// The rigid motion that takes `before` into `after` with the least sum of (weighted) squared distances, m².
+/// The rigid motion that maps `before` to `after` with the least sum of (weighted) squared distances, m².
 ///
 /// # Errors
-/// When the points do not determine it: fewer than three, all at or near one point or line, or two different shapes.
+/// If the points do not determine it: fewer than three, all at or near one point or line, or two different shapes.
 pub fn rigid_motion(
     before: &[Point3],
     after: &[Point3],
@@ -191,7 +191,7 @@ pub fn rigid_motion(
     Ok(between(&from, &to, &fitted.motion))
 }
 
-/// What is wrong with the shape of a set of points, by the principal axes of their scatter; none for a broad set.
+/// The degeneracy of a set of points, by the principal axes of their scatter; `None` for a broad set.
 pub(super) fn shape_of(points: &[Point3]) -> Option<Degenerate> {
     if points.len() < 3 {
         return Some(Degenerate::TooFew { matches: points.len() });
@@ -202,7 +202,7 @@ pub(super) fn shape_of(points: &[Point3]) -> Option<Degenerate> {
     let mut variances = (scatter.sum::<Matrix3<f64>>() / count).symmetric_eigenvalues();
     variances.as_mut_slice().sort_by(f64::total_cmp);
     let [along_m, across_m] = [variances[2], variances[1]].map(|variance| variance.max(0.0).sqrt());
-    // Noise widens a line, so that a set which failed by its motion may have a little more scatter than that asked for.
+    // Noise widens a line, so that a set without a motion may have slightly more scatter than required.
     if along_m < IDENTICAL_M {
         Some(Degenerate::Identical)
     } else if along_m < 2.0 * ACROSS_MIN_M {

@@ -5,7 +5,7 @@ use nalgebra::Matrix3;
 use super::*;
 use crate::estimate::motion_scene::{Scene, drive};
 
-/// Largest distance between where a motion takes the points and where they are, m.
+/// Largest distance between moved points and their matches, m.
 fn worst_m(motion: &Pose, before: &[Point3], after: &[Point3]) -> f64 {
     before.iter().zip(after).map(|(p, q)| (motion * p - q).norm()).fold(0.0, f64::max)
 }
@@ -156,7 +156,7 @@ fn degenerate_sets_are_called_by_their_name() {
     assert!(ask(&close).to_string().contains("0.0024 m"), "{}", ask(&close));
     assert_eq!(ask(&[on_line(0.0), on_line(f64::NAN), on_line(1.0)]), Degenerate::NotANumber);
 
-    // The mirror image of a regular tetrahedron is turned into it by no rotation better than by several others.
+    // No rotation maps a regular tetrahedron to its mirror image better than several others.
     let broad = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]].map(Point3::from);
     let mirrored = broad.map(|p| Point3::new(-p.x, -p.y, -p.z));
     assert_eq!(rigid_motion(&broad, &mirrored, None), Err(Degenerate::Unlike));

@@ -1,4 +1,4 @@
-//! Estimation that several trackers use.
+//! Estimation shared by several trackers.
 
 pub mod quantile;
 pub mod triangulate;

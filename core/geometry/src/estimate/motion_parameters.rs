@@ -1,7 +1,7 @@
 //! A rigid motion as six numbers: the paper's θ, translation and Euler angles (D§2, R173–R175).
 //!
-//! The angles are those of `frames.rs`: yaw about z, then pitch about y, then roll about x. They are a fair measure as
-//! long as the pitch stays away from ±90°, which a rover's does (R175). Differences of angles are wrapped (E30).
+//! The angles are those of `frames.rs`: yaw about z, then pitch about y, then roll about x. They are well defined as
+//! long as the pitch is far from ±90°, as that of a rover is (R175). Differences of angles are wrapped (E30).
 //!
 //! | symbol | our name | unit, frame |
 //! |---|---|---|
@@ -18,13 +18,13 @@ use crate::frames::{Pose, Vector3, attitude_from_roll_pitch_yaw};
 /// A rigid motion as translation and angles.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct MotionParameters {
-    /// Where the origin goes, m.
+    /// Translation of the origin, m.
     pub translation_m: [f64; 3],
-    /// About x, rad.
+    /// Roll about x, rad.
     pub roll_rad: f64,
-    /// About y, rad.
+    /// Pitch about y, rad.
     pub pitch_rad: f64,
-    /// About z, rad.
+    /// Yaw about z, rad.
     pub yaw_rad: f64,
 }
 
@@ -35,7 +35,7 @@ impl MotionParameters {
         Pose::from_parts(Translation3::from(Vector3::from(self.translation_m)), attitude)
     }
 
-    /// As one vector θ: x, y, z in m, then roll, pitch, yaw in rad.
+    /// The vector θ: x, y, z in m, then roll, pitch, yaw in rad.
     pub fn to_vector(self) -> Vector6<f64> {
         let [x, y, z] = self.translation_m;
         Vector6::new(x, y, z, self.roll_rad, self.pitch_rad, self.yaw_rad)
@@ -66,7 +66,7 @@ impl From<&Pose> for MotionParameters {
     }
 }
 
-/// The angle between −π and π that differs by whole turns.
+/// Wraps an angle to −π … π, rad.
 fn wrapped(angle: f64) -> f64 {
     (angle + PI).rem_euclid(TAU) - PI
 }

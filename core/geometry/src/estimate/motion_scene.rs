@@ -13,7 +13,7 @@ use crate::frames::{Point3, Pose, Vector3};
 const FOCAL_BASELINE_PX_M: f64 = 245.0;
 /// Focal length, px.
 const FOCAL_PX: f64 = 1223.0;
-/// Noise of a pixel in either eye, px.
+/// Pixel noise of each camera, 1σ, px.
 const PIXEL_NOISE_PX: f64 = 0.25;
 
 /// Points and noise drawn from one seed.
@@ -24,17 +24,17 @@ impl Scene {
         Self(Pcg64::seed_from_u64(seed))
     }
 
-    /// A number between two others.
+    /// A uniform random number between two others.
     pub(super) fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.0.random::<f64>()
     }
 
-    /// A point of the ground before the rover: 4 × 4 × 1 m, its middle 5 m ahead.
+    /// A point of the ground in front of the rover: 4 × 4 × 1 m, its middle 5 m ahead.
     pub(super) fn ground(&mut self) -> Point3 {
         Point3::new(self.between(3.0, 7.0), self.between(-2.0, 2.0), self.between(-0.5, 0.5))
     }
 
-    /// A deviate with a standard deviation on each axis.
+    /// Gaussian noise with this standard deviation on each axis.
     pub(super) fn noise(&mut self, sigma: f64) -> Vector3 {
         Vector3::from_fn(|_, _| {
             let deviate: f64 = StandardNormal.sample(&mut self.0);
@@ -50,7 +50,7 @@ impl Scene {
         MotionParameters::from_vector(&Vector6::new(shift(), shift(), shift(), roll, pitch, yaw)).to_pose()
     }
 
-    /// Many points and where a motion takes them, each coordinate after it with this noise.
+    /// Random points and their positions after a motion, with this noise on each coordinate of the latter.
     pub(super) fn moved(&mut self, count: usize, motion: &Pose, sigma_m: f64) -> (Vec<Point3>, Vec<Point3>) {
         let pair = |_| {
             let before = self.ground();
@@ -59,7 +59,7 @@ impl Scene {
         (0..count).map(pair).unzip()
     }
 
-    /// The same as matches.
+    /// The same points as matches.
     pub(super) fn matches(&mut self, count: usize, motion: &Pose, sigma_m: f64) -> Vec<Correspondence> {
         let (before, after) = self.moved(count, motion, sigma_m);
         let covariance = Matrix3::identity() * (sigma_m * sigma_m);
@@ -88,12 +88,12 @@ impl Scene {
     }
 }
 
-/// A match that only its end makes uncertain.
+/// A match in which only the second point is uncertain.
 pub(super) fn exact(before: Point3, after: Point3, after_covariance: Matrix3<f64>) -> Correspondence {
     Correspondence { before, after, before_covariance: Matrix3::zeros(), after_covariance }
 }
 
-/// A drive of half a metre with a turn, as between two updates.
+/// A drive of half a metre with a rotation, as between two updates.
 pub(super) fn drive() -> Pose {
     MotionParameters::from_vector(&Vector6::new(-0.48, 0.12, 0.03, 0.04, -0.03, 0.15)).to_pose()
 }

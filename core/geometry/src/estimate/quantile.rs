@@ -16,7 +16,7 @@ pub fn quantile_of_sorted(sorted: &[f64], share: f64) -> Option<f64> {
     let last = sorted.len().checked_sub(1)?;
     let place = share.clamp(0.0, 1.0) * last as f64;
     let (below, part) = (sorted[place as usize], place.fract());
-    // Without a part the next value may be infinite.
+    // With a zero fraction the next value is not used: it may be infinite.
     if part == 0.0 {
         return Some(below);
     }

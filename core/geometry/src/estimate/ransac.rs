@@ -1,19 +1,18 @@
-//! The motion that most matches agree on, in spite of those that are wrong (D§2, R164–R167; domain.md 13.2).
+//! The rigid motion with the largest consensus among matches with outliers (D§2, R164–R167; domain.md 13.2).
 //!
 //! ```text
-//! M times: draw 3 matches, fit the motion T (Horn), count the matches inside the gate      R164
+//! M times: sample 3 matches, fit the motion T (Horn), count the inliers                   R164
 //! gate:    | q − T p | < τ                                                                 R165, D-Eq 2
 //!     or   (q − T p)ᵀ (C_q + R C_p Rᵀ)⁻¹ (q − T p) < limit²                                R167, ours
-//! keep the largest consensus; of two alike, that with the smaller sum of squared distances
-//! fit to all inside; while other matches are inside than before, again                     R166
+//! keep the largest consensus; of two equal ones, that with the smaller sum of squared distances
+//! fit to all inliers; repeat while the set of inliers changes                              R166
 //! ```
 //!
-//! Three draws that are nearly on a line say nothing about the turn about it: they are drawn again. Their triangle's
-//! smallest altitude decides; the least area of 1e-4 m² that domain.md 13.1 names as well follows from an altitude of
-//! 2 cm, whose smallest triangle has 2.3e-4 m².
-//! The sets of the repeated fit can return to one that was there before: it then ends (ours), as it does after a number
-//! of fits. With `adaptive`, draws go on until one of three right matches was probable enough, 1 − (1 − w³)^M, with w
-//! the largest share of matches inside so far.
+//! A minimal sample that is nearly collinear does not determine the rotation about its line: it is drawn again. The
+//! criterion is the smallest altitude of its triangle; the least area of 1e-4 m² that domain.md 13.1 names as well
+//! follows from an altitude of 2 cm, whose smallest triangle has 2.3e-4 m². The repeated fit may return to an earlier
+//! set of inliers: it then ends (ours), as it does after a maximum number of fits. With `adaptive`, iterations
+//! continue until a sample without outliers is probable enough, 1 − (1 − w³)^M, with w the largest share of inliers so far.
 //!
 //! | symbol | our name | unit, frame |
 //! |---|---|---|
@@ -33,67 +32,67 @@ use super::quantile::median;
 use super::weighted_motion::{Correspondence, Loss, rigid_motion_by_covariance};
 use crate::frames::{Point3, Pose, PoseRecord};
 
-/// How often three matches are drawn again, for one draw, because they are nearly on a line.
+/// Number of times that a nearly collinear sample is drawn again in one iteration.
 const TRIES: u32 = 20;
-/// Spread across the main axis below which a drawn motion is none: the two triangles are of opposite shapes, m.
+/// Spread across the main axis below which a sample has no motion, m: its two triangles have opposite shapes.
 const DRAWN_ACROSS_M: f64 = 1e-4;
 
-/// By what a match counts as agreeing.
+/// The inlier test of a match.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = InlierGate)]
 pub enum Gate {
-    /// Its residual is shorter than `inlier_m`, as in the paper.
+    /// The residual is shorter than `inlier_m`, as in the paper.
     #[default]
     Distance,
-    /// Its residual is within `limit` standard deviations of its own covariance.
+    /// The residual is within `limit` standard deviations of its own covariance.
     Mahalanobis {
-        /// In standard deviations; 3 admits 97.1 % of right matches, 3.37 admits 99 %.
+        /// In standard deviations; 3 accepts 97.1 % of correct matches, 3.37 accepts 99 %.
         limit: f64,
     },
 }
 
-/// How matches count in the fit to all that agree.
+/// The weights of the inliers in the fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Weighting {
-    /// All alike: Horn's closed form, as in the paper.
+    /// Equal weights: Horn's closed form, as in the paper.
     #[default]
     None,
     /// By their covariance, which grows with range.
     Range,
 }
 
-/// How the motion is looked for.
+/// Settings of the motion estimate.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RansacSettings {
-    /// τ: largest residual of a match that agrees, m. Too small: far matches are lost; too large: wrong ones pass.
+    /// τ: largest residual of an inlier, m. Too small: far matches are lost; too large: wrong ones pass.
     pub inlier_m: f64,
-    /// M: draws of three matches; the least number where more may follow. Too few: no draw is free of wrong matches.
+    /// M: number of iterations, the smallest one if `adaptive`. Too few: no sample is free of outliers.
     pub draws: u32,
-    /// Whether draws go on until success is probable enough.
+    /// Whether iterations continue until success is probable enough.
     pub adaptive: bool,
-    /// That probability.
+    /// Required probability of a sample without outliers, if `adaptive`.
     pub success: f64,
-    /// Most draws where they go on.
+    /// Largest number of iterations, if `adaptive`.
     pub draws_max: u32,
-    /// Most fits to the matches that agree.
+    /// Largest number of fits to the inliers.
     pub refits_max: u32,
-    /// Smallest altitude of the triangle of three drawn matches, before and after, m.
+    /// Smallest altitude of the triangle of a minimal sample, before and after, m.
     pub altitude_min_m: f64,
-    /// By what a match agrees.
+    /// The inlier test.
     pub gate: Gate,
-    /// How matches count in the fit to all that agree.
+    /// The weights of the inliers in the fit.
     pub weighting: Weighting,
-    /// How their weight falls off with the residual; only where they are weighted by range.
+    /// Robust loss of the residuals; only with weighting by range.
     pub loss: Loss,
-    /// Of the draws.
+    /// Seed of the samples.
     pub seed: u64,
 }
 
 impl Default for RansacSettings {
-    /// The paper's: 100 draws, 3 cm, unweighted (R164, R165); the rest is ours (R166, domain.md 13).
+    /// The paper's values: 100 iterations, 3 cm, unweighted (R164, R165); the rest is ours (R166, domain.md 13).
     fn default() -> Self {
         Self {
             inlier_m: 0.03,
@@ -111,43 +110,43 @@ impl Default for RansacSettings {
     }
 }
 
-/// One fit to the matches that agreed with the motion before.
+/// One fit to the inliers of the previous motion.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Refit {
-    /// How many were fitted.
+    /// Number of inliers.
     pub inliers: u32,
     /// Root mean square of their residuals under the fitted motion, m.
     pub rms_m: f64,
 }
 
-/// How the repeated fit ended.
+/// The end of the repeated fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Ending {
-    /// The same matches agreed with the new motion.
+    /// The set of inliers did not change.
     Settled,
-    /// The matches that agreed were those of an earlier fit: the sets would go round for ever.
+    /// The set of inliers was that of an earlier fit, so that the sets would repeat for ever.
     Repeating,
-    /// The number of fits was used up.
+    /// The largest number of fits was reached.
     UsedUp,
 }
 
-/// The motion that was found and how.
+/// The estimated motion, with its inliers and fits.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct MotionFit {
-    /// T; none with a reason in `missing`.
+    /// T; `None` with a reason in `missing`.
     pub after_from_before: Option<PoseRecord>,
-    /// Why there is no motion, in one sentence.
+    /// Why there is no motion, as one sentence.
     pub missing: Option<String>,
-    /// The matches that agree with it, ascending.
+    /// Indices of the inliers, ascending.
     pub inliers: Vec<usize>,
-    /// Residuals of all matches under it, m; empty without a motion.
+    /// Residuals of all matches after the motion, m; empty without a motion.
     pub residuals_m: Vec<f64>,
-    /// How many matches agreed with each drawn motion; 0 where three drawn matches were always on a line.
+    /// Number of inliers of each iteration; 0 if all its samples were collinear.
     pub consensus_by_draw: Vec<u32>,
-    /// The fits to all that agreed, in order.
+    /// The fits to the inliers, in order.
     pub refits: Vec<Refit>,
-    /// How they ended.
+    /// The end of the fits.
     pub ending: Option<Ending>,
     /// Root mean square of the inliers' residuals, m.
     pub rms_m: Option<f64>,
@@ -156,7 +155,7 @@ pub struct MotionFit {
 }
 
 impl MotionFit {
-    /// The motion that was found.
+    /// The estimated motion.
     pub fn motion(&self) -> Option<Pose> {
         self.after_from_before.map(PoseRecord::to_pose)
     }
@@ -167,13 +166,13 @@ impl MotionFit {
     }
 }
 
-/// The matches in columns, so that the residuals of all are computed several at a time.
+/// The matches in columns, so that several residuals are computed at a time.
 struct Matches<'a> {
     pairs: &'a [Correspondence],
     before: [Vec<f64>; 3],
     after: [Vec<f64>; 3],
     gate: Gate,
-    /// What a squared distance must stay below to be inside at all, m².
+    /// Upper bound of an inlier's squared residual, m².
     outer_m2: Vec<f64>,
 }
 
@@ -181,7 +180,7 @@ impl<'a> Matches<'a> {
     fn new(pairs: &'a [Correspondence], settings: &RansacSettings) -> Self {
         let column =
             |of: fn(&Correspondence) -> &Point3, axis: usize| pairs.iter().map(|p| of(p)[axis]).collect();
-        // The trace of a covariance is its largest variance at least, and does not change by a rotation.
+        // The trace of a covariance is at least its largest variance, and is invariant to rotation.
         let outer_m2 = |pair: &Correspondence| match settings.gate {
             Gate::Distance => settings.inlier_m * settings.inlier_m,
             Gate::Mahalanobis { limit } => {
@@ -212,7 +211,7 @@ impl<'a> Matches<'a> {
         }));
     }
 
-    /// Whether a match whose squared distance is inside the outer limit is inside the gate.
+    /// Whether a match whose squared residual is below the bound is an inlier.
     fn is_inside(&self, match_: usize, motion: &Pose, rotation: &Matrix3<f64>) -> bool {
         let Gate::Mahalanobis { limit } = self.gate else { return true };
         let pair = &self.pairs[match_];
@@ -221,7 +220,7 @@ impl<'a> Matches<'a> {
         solved.is_some_and(|solved| residual.dot(&solved) < limit * limit)
     }
 
-    /// How many matches agree with a motion of which `squares_m2` are the squared residuals.
+    /// Number of inliers of a motion with the squared residuals `squares_m2`.
     fn count(&self, motion: &Pose, squares_m2: &[f64]) -> u32 {
         match self.gate {
             Gate::Distance => {
@@ -231,7 +230,7 @@ impl<'a> Matches<'a> {
         }
     }
 
-    /// Those matches.
+    /// Indices of these inliers.
     fn inliers(&self, motion: &Pose, squares_m2: &[f64]) -> Vec<usize> {
         let rotation = motion.rotation.to_rotation_matrix();
         let outer = squares_m2.iter().zip(&self.outer_m2).enumerate();
@@ -240,7 +239,7 @@ impl<'a> Matches<'a> {
     }
 }
 
-/// The motion that most matches agree on.
+/// Estimates the motion with the largest consensus.
 pub fn fit_motion(pairs: &[Correspondence], settings: &RansacSettings) -> MotionFit {
     let mut fit = MotionFit::default();
     if pairs.len() < 3 {
@@ -261,7 +260,7 @@ pub fn fit_motion(pairs: &[Correspondence], settings: &RansacSettings) -> Motion
     refit(fit, &matches, settings, motion, inliers)
 }
 
-/// The drawn motion with the largest consensus; none when no three matches off a line were drawn.
+/// The sampled motion with the largest consensus, and its inliers; `None` if all samples were collinear.
 fn draw(
     matches: &Matches<'_>,
     settings: &RansacSettings,
@@ -292,12 +291,12 @@ fn draw(
     })
 }
 
-/// Probability that none of `draws` minimal samples of three has inliers alone, at a share of inliers (R226).
+/// Probability that none of `draws` minimal samples of three is free of outliers, at a share of inliers (R226).
 fn failure_probability(share: f64, draws: usize) -> f64 {
     (1.0 - share.powi(3)).powf(draws as f64)
 }
 
-/// Whether another draw follows `done` draws, of which the best had `most` of all matches inside.
+/// Whether another iteration follows `done` iterations, of which the best had `most` inliers among all matches.
 fn is_to_draw(done: usize, most: u32, all: usize, settings: &RansacSettings) -> bool {
     let share = f64::from(most) / all as f64;
     let failure = failure_probability(share, done);
@@ -305,7 +304,7 @@ fn is_to_draw(done: usize, most: u32, all: usize, settings: &RansacSettings) -> 
         || (settings.adaptive && done < settings.draws_max as usize && failure > 1.0 - settings.success)
 }
 
-/// The motion of three matches drawn at random; none when they are the same or nearly on a line.
+/// The motion of a random minimal sample; `None` if its matches coincide or are nearly collinear.
 fn drawn_motion(pairs: &[Correspondence], settings: &RansacSettings, random: &mut Pcg64) -> Option<Pose> {
     let drawn = [(); 3].map(|()| &pairs[random.random_range(0..pairs.len())]);
     let (before, after) = (drawn.map(|pair| pair.before), drawn.map(|pair| pair.after));
@@ -320,13 +319,13 @@ fn drawn_motion(pairs: &[Correspondence], settings: &RansacSettings, random: &mu
     (fitted.across_m > DRAWN_ACROSS_M).then(|| horn::between(&before[0], &after[0], &fitted.motion))
 }
 
-/// The smallest altitude of a triangle: twice its area over its longest side, m; 0 where points coincide.
+/// The smallest altitude of a triangle: twice its area over its longest side, m; 0 if all points coincide.
 fn altitude_m([a, b, c]: &[Point3; 3]) -> f64 {
     let longest = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared()).sqrt();
     if longest > 0.0 { (b - a).cross(&(c - a)).norm() / longest } else { 0.0 }
 }
 
-/// Fits all matches that agree until the same ones agree again.
+/// Repeats the fit to the inliers until their set no longer changes.
 fn refit(
     mut fit: MotionFit,
     matches: &Matches<'_>,
@@ -367,7 +366,7 @@ fn refit(
     fit
 }
 
-/// The motion of some of the matches.
+/// Fits the motion to some of the matches.
 fn fit_to(pairs: &[Correspondence], which: &[usize], settings: &RansacSettings) -> Result<Pose, Degenerate> {
     match settings.weighting {
         Weighting::None => {

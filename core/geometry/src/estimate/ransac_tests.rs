@@ -1,4 +1,4 @@
-//! RANSAC under many wrong matches, and what it says when there is nothing to find.
+//! RANSAC with many outliers, and its messages if there is no motion.
 
 use super::*;
 use crate::estimate::motion_scene::{Scene, drive, exact};
@@ -7,7 +7,7 @@ use crate::frames::Vector3;
 /// The middle of the ground, where the target is.
 const TARGET: Point3 = Point3::new(5.0, 0.0, 0.0);
 
-/// `count` matches of which the first `wrong` lead anywhere on the ground.
+/// `count` matches, of which the first `wrong` are matched with random points of the ground.
 fn with_wrong(scene: &mut Scene, count: usize, wrong: usize, sigma_m: f64) -> Vec<Correspondence> {
     let mut pairs = scene.matches(count, &drive(), sigma_m);
     pairs[..wrong].iter_mut().for_each(|pair| pair.after = drive() * scene.ground());
@@ -22,8 +22,8 @@ fn missing(pairs: &[Correspondence]) -> String {
 
 #[test]
 fn sixty_per_cent_of_wrong_matches_are_seen_through() {
-    // 300 matches on 4 × 4 × 1 m, of which 120 are right to 1 cm on each axis; of a hundred draws of three one at least
-    // is right with a probability of 99.87 %.
+    // 300 matches on 4 × 4 × 1 m, of which 120 are correct to 1 cm on each axis; at least one of a hundred samples of
+    // three has no outlier with a probability of 99.87 %.
     let (mut good, mut worst_m, mut worst_rad) = (0, 0.0_f64, 0.0_f64);
     let mut scene = Scene::new(1);
     for seed in 0..1000 {
@@ -95,8 +95,8 @@ fn degenerate_sets_are_refused_by_name() {
 
 #[test]
 fn a_line_among_wrong_matches_is_not_taken_for_a_motion() {
-    // The right matches lie within a centimetre of a line, so that some three span a triangle; the wrong ones lead
-    // farther and farther away.
+    // The correct matches are within a centimetre of a line, so that some three span a triangle; the wrong ones are
+    // matched farther and farther away.
     let mut scene = Scene::new(4);
     let mut pairs = with_wrong(&mut scene, 60, 20, 0.0);
     for (i, pair) in pairs.iter_mut().enumerate() {
@@ -112,7 +112,7 @@ fn a_line_among_wrong_matches_is_not_taken_for_a_motion() {
 
 #[test]
 fn matches_that_all_lead_elsewhere_agree_on_nothing() {
-    // Residuals of metres: not even the three that were drawn come within a millimetre of their motion.
+    // Residuals of metres: not even the three sampled matches are within a millimetre of their motion.
     let pairs = with_wrong(&mut Scene::new(5), 40, 40, 0.0);
     let settings = RansacSettings { inlier_m: 0.001, ..RansacSettings::default() };
     let fit = fit_motion(&pairs, &settings);
@@ -129,7 +129,7 @@ fn draws_go_on_until_success_is_probable() {
     };
     assert_eq!(ask(150, false), 10);
     assert_eq!(ask(0, true), 10);
-    // w is just above 0.25: ln 0.001 / ln(1 − w³) = 439 draws, fewer by a few where wrong matches are inside by chance.
+    // w is just above 0.25: ln 0.001 / ln(1 − w³) = 439 samples, a few less if wrong matches are inliers by chance.
     assert!((330..=450).contains(&ask(150, true)), "{}", ask(150, true));
     assert_eq!(ask(199, true), 2000);
 }

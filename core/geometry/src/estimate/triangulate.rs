@@ -1,4 +1,4 @@
-//! Where two rays meet: the midpoint of their shortest connection.
+//! Triangulation of two rays: the midpoint of their shortest connection.
 //!
 //! For rays (o1, u1), (o2, u2) with unit u (domain.md 3.1; Yakimovsky & Cunningham 1978):
 //!
@@ -13,10 +13,10 @@
 
 use crate::frames::{Point3, Ray};
 
-/// Smallest squared sine of the angle between two rays that still meet somewhere (domain.md 3.1).
+/// Smallest squared sine of the angle between two rays that are not parallel (domain.md 3.1).
 const PARALLEL: f64 = 1e-12;
 
-/// Where two rays pass closest to each other.
+/// The closest approach of two rays.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Triangulated {
     /// Midpoint of the shortest connection, in the rays' frame, m.
@@ -29,7 +29,7 @@ pub struct Triangulated {
     pub gap_m: f64,
 }
 
-/// The midpoint of two rays; `None` when they are parallel or meet behind one of the cameras.
+/// The midpoint of two rays; `None` if they are parallel or meet behind one of the cameras.
 pub fn midpoint(left: &Ray, right: &Ray) -> Option<Triangulated> {
     let (u1, u2) = (&left.direction, &right.direction);
     let b = right.origin - left.origin;

@@ -14,32 +14,32 @@
 //! | α, β, κ | [`UnscentedParameters`] | – |
 //! | y, P_y | the result | units of the function's value and their products |
 //!
-//! L is the Cholesky factor. It is computed so that a semidefinite P works: where an input has no variance
-//! left once the ones before it are known, its column is zero. Nothing is drawn at random and the points
-//! are summed in order, so the same input gives the same bits.
+//! L is the Cholesky factor, computed so that a semidefinite P works: if an input has no variance given the inputs
+//! before it, its column is zero. Nothing is random and the points are summed in order, so the same input gives the
+//! same bits.
 
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// Part of an input's variance below which what is left of it is rounding.
+/// Share of an input's variance below which the remaining variance is rounding.
 const ROUNDING: f64 = 1e-13;
 /// Largest correlation that may be lost with such a remainder.
 const LOST: f64 = 1e-6;
 
-/// Where the points of the unscented transform lie and how they count.
+/// Position and weights of the points of the unscented transform.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct UnscentedParameters {
     /// α: spread of the points.
     pub alpha: f64,
     /// β: extra weight of the middle point in the covariance; 2 is best for Gaussian inputs and small α.
     pub beta: f64,
-    /// κ: second spread.
+    /// κ: secondary spread.
     pub kappa: f64,
 }
 
 impl Default for UnscentedParameters {
-    /// α = 1, β = 0, κ = 0: 2n points at ±√n σ, and the middle point does not count (domain.md 13.4).
+    /// α = 1, β = 0, κ = 0: 2n points at ±√n σ, and the middle point has no weight (domain.md 13.4).
     fn default() -> Self {
         Self { alpha: 1.0, beta: 0.0, kappa: 0.0 }
     }
@@ -47,8 +47,8 @@ impl Default for UnscentedParameters {
 
 /// Mean and covariance of `f` of a vector with the given mean and covariance.
 ///
-/// `None` when `f` has no value at one of the points, when the covariance is not positive semidefinite or
-/// not finite, or when the parameters leave no spread (n + λ ≤ 0).
+/// `None` if `f` has no value at one of the points, if the covariance is not positive semidefinite or not finite, or
+/// if the parameters leave no spread (n + λ ≤ 0).
 pub fn unscented<const N: usize, const M: usize>(
     mean: &SVector<f64, N>,
     covariance: &SMatrix<f64, N, N>,
@@ -99,7 +99,7 @@ fn factor_of_semidefinite<const N: usize>(matrix: &SMatrix<f64, N, N>) -> Option
             factor[(i, j)] = (matrix[(i, j)] - common) / factor[(j, j)];
         }
     }
-    // A covariance with an input that has no variance would be lost above: such a matrix is not semidefinite.
+    // The loop would drop the covariance with an input that has no variance: such a matrix is not semidefinite.
     let difference = factor * factor.transpose() - matrix;
     let scale = |i: usize| matrix[(i, i)].abs().sqrt();
     let kept = |i: usize, j: usize| difference[(i, j)].abs() <= LOST * scale(i) * scale(j);

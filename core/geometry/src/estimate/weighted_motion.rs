@@ -1,8 +1,8 @@
-//! The rigid motion between matched points that are uncertain, each in its own way, and the motion's covariance.
+//! The rigid motion between matched points with individual covariances, and the motion's covariance.
 //!
-//! The error of a stereo point is a needle along the line of sight that grows with the range squared. Horn's closed form
-//! counts all points and directions alike; here the residuals count by their covariance (R167 asks for the range; the
-//! method is ours, Gauss–Newton from Horn's motion):
+//! The error of a stereo point is elongated along the line of sight and grows with the range squared. Horn's closed
+//! form weights all points and directions equally; here the residuals are weighted by their covariance (R167 requires
+//! the range; the method is ours, Gauss–Newton from Horn's motion):
 //!
 //! ```text
 //! y = R p + t        r = q − y        C = C_q + R C_p Rᵀ        minimise  Σ ρ(rᵀ C⁻¹ r)
@@ -10,9 +10,9 @@
 //! A = [I, −[y − c]×]     W = ρ'(rᵀ C⁻¹ r) C⁻¹     H = Σ Aᵀ W A     δ = H⁻¹ Σ Aᵀ W r     cov(δ) = H⁻¹
 //! ```
 //!
-//! ρ(d²) is d² (least squares), or grows more slowly from k standard deviations on: Huber's and Cauchy's losses with the
-//! constants that keep 95 % of the efficiency for normal errors. H⁻¹ is then the covariance as long as few matches are
-//! held back. R in C is that of the step before, which moves the result by less than the next step.
+//! ρ(d²) is d² (least squares), or grows more slowly beyond k standard deviations: Huber's and Cauchy's losses with
+//! the constants for 95 % efficiency with normal errors. H⁻¹ is then the covariance as long as few matches are
+//! down-weighted. R in C is that of the previous step, which changes the result by less than the next step.
 //!
 //! | symbol | our name | unit, frame |
 //! |---|---|---|
@@ -28,7 +28,7 @@ use utoipa::ToSchema;
 use super::horn::{Degenerate, rigid_motion};
 use crate::frames::{Point3, Pose, Vector3};
 
-/// Most steps of Gauss–Newton; three or four suffice for any motion that Horn's method starts well.
+/// Largest number of Gauss–Newton steps; three or four suffice if Horn's motion is a good start.
 const STEPS_MAX: u32 = 20;
 /// A step shorter than this, in m and rad, ends the iteration.
 const STEP_SETTLED: f64 = 1e-10;
@@ -37,12 +37,12 @@ const HUBER: f64 = 1.345;
 /// Standard deviations at which Cauchy's loss halves a match's weight.
 const CAUCHY: f64 = 2.385;
 
-/// One surface point as it was measured before and after the motion.
+/// One surface point, measured before and after the motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Correspondence {
-    /// In the frame before, m.
+    /// Position in the frame before, m.
     pub before: Point3,
-    /// In the frame after, m.
+    /// Position in the frame after, m.
     pub after: Point3,
     /// Covariance of `before`, m².
     pub before_covariance: Matrix3<f64>,
@@ -51,7 +51,7 @@ pub struct Correspondence {
 }
 
 impl Correspondence {
-    /// Where the motion leaves the point short of its match, m, in the frame after.
+    /// Residual of the match under a motion, m, in the frame after.
     pub fn residual(&self, after_from_before: &Pose) -> Vector3 {
         self.after - after_from_before * self.before
     }
@@ -62,21 +62,21 @@ impl Correspondence {
     }
 }
 
-/// How the weight of a match falls off with its residual.
+/// The decrease of a match's weight with its residual.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Loss {
-    /// Not at all: least squares.
+    /// No decrease: least squares.
     #[default]
     Squares,
-    /// As 1/d from 1.345 standard deviations on (Huber).
+    /// 1/d from 1.345 standard deviations on (Huber).
     Huber,
-    /// As 1/(1 + d²/2.385²) (Cauchy).
+    /// 1/(1 + d²/2.385²) (Cauchy).
     Cauchy,
 }
 
 impl Loss {
-    /// ρ': what a match of squared distance d² counts.
+    /// ρ': the weight of a match of squared distance d².
     pub fn weight(self, squared_distance: f64) -> f64 {
         match self {
             Self::Squares => 1.0,
@@ -86,18 +86,18 @@ impl Loss {
     }
 }
 
-/// A motion and how well it is known.
+/// A motion with its covariance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UncertainMotion {
     /// The motion.
     pub after_from_before: Pose,
-    /// The point c about which the small motions of `covariance` turn, in the frame after, m.
+    /// The centre c of the small motions of `covariance`, in the frame after, m.
     pub about: Point3,
-    /// Covariance of the small motion (τ, ω) that may follow `after_from_before`, m², m rad and rad².
+    /// Covariance of a small motion (τ, ω) after `after_from_before`, m², m rad and rad².
     pub covariance: Matrix6<f64>,
 }
 
-/// H and Σ Aᵀ W r of the normal equations: of one match or of several.
+/// H and Σ Aᵀ W r of the normal equations, for one match or several.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Normal {
     pub(super) information: Matrix6<f64>,
@@ -105,7 +105,7 @@ pub(super) struct Normal {
 }
 
 impl Normal {
-    /// One match's share under a motion; none where its covariance has no inverse.
+    /// The contribution of one match under a motion; `None` if its covariance has no inverse.
     pub(super) fn of(pair: &Correspondence, motion: &Pose, about: &Point3, loss: Loss) -> Option<Self> {
         let rotation = motion.rotation.to_rotation_matrix();
         let inverse = pair.residual_covariance(rotation.matrix()).cholesky()?.inverse();
@@ -127,13 +127,13 @@ impl Normal {
         Some(Self { information, pull })
     }
 
-    /// Adds another's share, `times` over.
+    /// Adds another contribution, `times` over.
     pub(super) fn add(&mut self, other: &Self, times: f64) {
         self.information += other.information * times;
         self.pull += other.pull * times;
     }
 
-    /// The step (τ, ω) and its covariance; none where the matches leave a direction free.
+    /// The step (τ, ω) and its covariance; `None` if the matches leave a direction undetermined.
     pub(super) fn solve(&self) -> Option<(Vector6<f64>, Matrix6<f64>)> {
         let covariance = self.information.cholesky()?.inverse();
         Some((covariance * self.pull, covariance))
@@ -153,7 +153,7 @@ pub(super) fn followed_by(motion: &Pose, step: &Vector6<f64>, about: &Point3) ->
 /// The motion with the least sum of losses, and its covariance.
 ///
 /// # Errors
-/// As [`rigid_motion`], and when a match's covariance is not positive definite.
+/// As [`rigid_motion`], and if a match's covariance is not positive definite.
 pub fn rigid_motion_by_covariance(
     pairs: &[Correspondence],
     loss: Loss,

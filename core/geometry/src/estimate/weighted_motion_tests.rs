@@ -3,7 +3,7 @@
 use super::*;
 use crate::estimate::motion_scene::{Scene, drive, exact};
 
-/// The error (τ, ω) that, after the estimate, leads to the truth.
+/// The error (τ, ω): the small motion from the estimate to the truth.
 fn error(found: &UncertainMotion, truth: &Pose) -> Vector6<f64> {
     let rest = truth * found.after_from_before.inverse();
     let shift = rest * found.about - found.about;
@@ -11,7 +11,7 @@ fn error(found: &UncertainMotion, truth: &Pose) -> Vector6<f64> {
     Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
 }
 
-/// Points 2 to 15 m away, as a navcam sees them.
+/// Points 2 to 15 m away, in the field of view of a navcam.
 fn near_and_far(scene: &mut Scene, count: usize) -> Vec<Point3> {
     let point = |_| {
         let (range, azimuth) = (scene.between(2.0, 15.0), scene.between(-0.4, 0.4));

@@ -1,7 +1,7 @@
-//! What a recording contains, found before anything of it is imported: format, stops, image sizes and stereo pairs.
+//! Examines a recording before an import: format, stops, image sizes and stereo pairs.
 //!
-//! A foreign recording is imported without writing, so that what is shown is what the import makes and what is refused here is
-//! refused there; pixels are not read. [`find`] lists the recordings below a folder.
+//! A foreign recording is imported without writing, so that result and errors are those of the import; pixels are not
+//! read. [`find`] lists the recordings below a folder.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -14,29 +14,29 @@ use sightline_world::traverse::{CameraSource, TraverseIndex, View};
 /// The name of the native format.
 pub const NATIVE: &str = "Sightline drive";
 
-/// What a recording contains.
+/// The content of a recording.
 #[derive(Clone, Debug)]
 pub struct Examined {
     /// The name of its format.
     pub format: &'static str,
-    /// Whether it is opened as it is, without an import.
+    /// Whether it can be opened without an import.
     pub is_native: bool,
-    /// The index that an import would write, or that is there.
+    /// The index that an import would write, or the existing one.
     pub index: TraverseIndex,
     /// Width and height of the left image of the first stop, px.
     pub left_size: [u32; 2],
     /// Width and height of the right image of the first stop, px.
     pub right_size: [u32; 2],
-    /// How many images there are, those of further cameras included.
+    /// Number of images, those of further cameras included.
     pub image_count: usize,
-    /// What would be left out or assumed, one sentence each.
+    /// Omissions and assumptions of an import, one sentence each.
     pub notes: Vec<String>,
 }
 
 /// Examines the recording at `path`, a folder or a file.
 ///
 /// # Errors
-/// Those of an import that are found without reading pixels.
+/// Those errors of an import that do not depend on pixels.
 pub fn examine(path: &Path, options: &ImportOptions, cancel: &AtomicBool) -> Result<Examined> {
     if let Some(root) = &options.within {
         links::check(path, root, cancel)?;
@@ -102,9 +102,10 @@ pub struct Found {
     pub format: &'static str,
 }
 
-/// The recordings in `folder` and at most `depth` folders below it, by path, and whether these are all: at most `limit`.
+/// Lists the recordings in `folder` and at most `depth` folders below it, by path, at most `limit`; also returns
+/// whether these are all.
 ///
-/// Links are not followed, and nothing is looked for inside a recording.
+/// Links are not followed, and a recording is not searched for others.
 pub fn find(folder: &Path, depth: usize, limit: usize) -> (Vec<Found>, bool) {
     let mut found = Vec::new();
     let is_all = find_into(&mut found, folder, depth, limit);
@@ -127,7 +128,7 @@ fn find_into(found: &mut Vec<Found>, folder: &Path, depth: usize, limit: usize) 
     folders.iter().all(|below| found.len() < limit && find_into(found, below, depth - 1, limit))
 }
 
-/// The format of the recording in a folder.
+/// The format of the recording in a folder; `None` without one.
 fn format_of(folder: &Path) -> Option<&'static str> {
     if index_file::find(folder).is_ok() {
         return Some(NATIVE);

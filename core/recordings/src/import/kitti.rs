@@ -7,19 +7,19 @@
 //! - `image_0`, `image_1`: the left and right images `000000.png`, `000001.png`, …;
 //! - `poses.txt` (or `../../poses/<sequence>.txt`): a 3 × 4 matrix a line, the pose of camera 0 at that frame
 //!   in the frame of camera 0 at the sequence's first frame, m;
-//! - `times.txt` (optional): seconds, one a line; else 0.1 s a frame.
+//! - `times.txt` (optional): seconds, one per line; otherwise 0.1 s per frame.
 //!
 //! The rover frame is camera 0's, with its axes renamed: x = z_c, y = x_c, z = y_c (`rover_from_camera`), and
 //! the site frame is the rover frame at the first imported stop. A projection matrix P = [M | p] is the CAHV
 //! model with A, H, V = third, first, second row of M and C = −M⁻¹ p.
 //!
-//! **The poses are true**, so the estimate that the tracker is given is made from them as odometry would make
-//! it, by the simulator's model ([`sightline_world::rover::odometry::estimates`]): with T_k the true and E_k the estimated
+//! **The poses are true**, so the tracker's pose estimate is computed from them with a simulated odometry error, by
+//! the simulator's model ([`sightline_world::rover::odometry::estimates`]): with T_k the true and E_k the estimated
 //! pose (`site_from_rover`) at stop k,
 //!
 //! ```text
 //! Δ_k = T_{k−1}⁻¹ T_k = (R, t)                  true motion of the step, in the rover frame before it
-//! t' = t + (a n₁) u + (c n₂) v + (c n₃) w       u along t, v and w across; a = along_fraction · |t|, c alike
+//! t' = t + (a n₁) u + (c n₂) v + (c n₃) w       u along t, v and w across; a = along_fraction · |t|, c likewise
 //! R' = R · Rz(α n₆) Ry(α n₅) Rx(α n₄)           α = attitude_deg in rad
 //! E_0 = T_0,   E_k = E_{k−1} · (R', t')         n₁ … n₆ standard normal, from the seed: errors add up
 //! ```
@@ -39,9 +39,9 @@ use sightline_vision::image::io;
 use sightline_world::rover::odometry;
 use sightline_world::traverse::{CameraSource, FORMAT_VERSION, Stop, StopTruth, TraverseIndex, View};
 
-/// Time between frames where `times.txt` is missing, s.
+/// Time between frames without `times.txt`, s.
 const FRAME_TIME_S: f64 = 0.1;
-/// How far a pose's rotation matrix may be from a rotation (files carry seven digits).
+/// Largest deviation of a pose's matrix from a rotation (files have seven digits).
 const ROTATION_TOLERANCE: f64 = 1e-3;
 
 /// The smallest distance between the two cameras, m.
@@ -50,7 +50,7 @@ const SMALLEST_BASELINE_M: f64 = 1e-3;
 /// The importer.
 pub struct Kitti;
 
-/// The description of a traverse with so many stops.
+/// The description of a traverse with this number of stops.
 fn description(stops: usize, options: &ImportOptions) -> String {
     format!(
         "KITTI odometry sequence, {stops} stereo frames. Truth: the recording's poses. Estimate: the truth with a \
@@ -143,7 +143,7 @@ fn read_text(path: &Path) -> Result<String> {
     files::read_text(path).map_err(|source| Error::Read { path: path.to_owned(), source })
 }
 
-/// The finite numbers of a line; `None` where one of its words is none.
+/// The finite numbers of a line; `None` if one of its words is not a finite number.
 fn numbers(line: &str) -> Option<Vec<f64>> {
     line.split_whitespace().map(|word| word.parse().ok().filter(|v: &f64| v.is_finite())).collect()
 }
@@ -184,7 +184,7 @@ fn cahv(p: &[f64; 12]) -> Option<CameraModel> {
     Some(CameraModel::Cahv(Cahv::as_printed(centre, row(2), row(0), row(1))))
 }
 
-/// Beside the images, or where the benchmark's own folders have them, unless that is outside of the allowed folder.
+/// The path of the poses: beside the images, or in the benchmark's own folders unless that is outside of the allowed folder.
 fn poses_path(sequence: &Path, options: &ImportOptions) -> PathBuf {
     let beside = sequence.join("poses.txt");
     let name = sequence.canonicalize().ok().and_then(|path| Some(path.file_name()?.to_owned()));
@@ -215,7 +215,7 @@ pub fn read_poses(path: &Path) -> Result<Vec<Pose>> {
     text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()).map(read).collect()
 }
 
-/// The rotation closest to a matrix that is one up to rounding: U Vᵀ of its singular value decomposition.
+/// The rotation closest to a matrix that is a rotation up to rounding: U Vᵀ of its singular value decomposition.
 fn nearest_rotation(matrix: &Matrix3<f64>) -> UnitQuaternion<f64> {
     let parts = matrix.svd(true, true);
     let closest = parts.u.zip(parts.v_t).map_or(*matrix, |(u, v_t)| u * v_t);

@@ -1,8 +1,8 @@
-//! Keeps a recording inside a folder: no symbolic link in it may lead out.
+//! Confines a recording to a folder: no symbolic link in it may lead out.
 //!
-//! A page may have the server open a recording below the folders that were named at its start, and nothing else. What an
-//! importer reads is in the recording's folder, so that checking its links before the import is enough against a folder that
-//! was prepared; who can exchange files during the import can read them anyway.
+//! A page may have the server open a recording below the folders named at its start, and nothing else. An importer
+//! reads only the recording's folder, so checking its links before the import protects against a prepared folder.
+//! Anyone who can exchange files during the import can read them anyway.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -13,7 +13,7 @@ use sightline_geometry::error::{Error, Result};
 /// The largest number of files and folders that a recording may have.
 const ENTRY_LIMIT: usize = 500_000;
 
-/// Refuses a recording, given by its folder or one of its files, with a link that leads out of `root`, which is canonical.
+/// Rejects a recording, given by its folder or one of its files, with a link that leads out of `root`, which is canonical.
 ///
 /// # Errors
 /// Such a link, a folder that cannot be read, too many files, or [`Error::Cancelled`].

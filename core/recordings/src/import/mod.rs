@@ -1,12 +1,12 @@
-//! Importers: from a foreign recording to a native folder, one file per format.
+//! Importers: convert a foreign recording to a native folder, one file per format.
 //!
-//! | format | file | what it reads |
+//! | format | file | input |
 //! |---|---|---|
 //! | KITTI odometry | `kitti` | `calib.txt`, `poses.txt`, `image_0`, `image_1` |
-//! | PDS3 | `pds3` (labels: `odl`) | pictures of MER and MSL with camera model and rover pose in the label |
+//! | PDS3 | `pds3` (labels: `odl`) | images of MER and MSL with camera model and rover pose in the label |
 //!
-//! An importer writes the images through [`Output`] and returns the index; the index is written last, so a
-//! folder with an index is complete. When the import fails or is cancelled, what it wrote is removed.
+//! An importer writes the images through [`Output`] and returns the index; the index is written last, so a folder
+//! with an index is complete. If the import fails or is cancelled, its files are removed.
 
 pub mod examine;
 pub mod kitti;
@@ -27,21 +27,21 @@ use sightline_world::traverse::TraverseIndex;
 /// The largest file that is copied, bytes.
 const FILE_LIMIT: u64 = 256 << 20;
 
-/// What a person may choose; each format uses what concerns it.
+/// Options of an import; each format uses those that apply to it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImportOptions {
     /// The name of the traverse; by default that of the recording.
     pub name: Option<String>,
-    /// The files to take, relative to the recording's folder; for PDS3 left and right in turn. Empty: the
-    /// format chooses.
+    /// The files to import, relative to the recording's folder; for PDS3 left and right alternately. Empty: chosen by
+    /// the format.
     pub files: Vec<PathBuf>,
     /// The first frame of a sequence.
     pub first_frame: usize,
     /// The largest number of stops.
     pub max_stops: usize,
-    /// Take every n-th frame of a sequence.
+    /// Import every n-th frame of a sequence.
     pub every: usize,
-    /// For recordings whose poses are true: 1σ error of the simulated odometry, as a fraction of the way.
+    /// For recordings whose poses are true: 1σ error of the simulated odometry, as a fraction of the distance driven.
     pub odometry_fraction: f64,
     /// 1σ error of the simulated odometry about each axis at each step, deg.
     pub attitude_deg: f64,
@@ -49,7 +49,7 @@ pub struct ImportOptions {
     pub seed: u64,
     /// Whether files in the output folder may be replaced.
     pub existing: Existing,
-    /// The folder that no file of the recording may leave, also not by a symbolic link; `None`: links are followed anywhere.
+    /// The folder that no file of the recording may leave, not even by a symbolic link; `None`: links are followed anywhere.
     pub within: Option<PathBuf>,
 }
 
@@ -88,22 +88,22 @@ impl ImportOptions {
     }
 }
 
-/// What an import made.
+/// The result of an import.
 #[derive(Clone, Debug)]
 pub struct Imported {
     /// The index that was written.
     pub index: TraverseIndex,
     /// The number of images written.
     pub images_written: usize,
-    /// What was left out or assumed, one sentence each.
+    /// Omissions and assumptions, one sentence each.
     pub notes: Vec<String>,
 }
 
 /// A foreign format.
 pub trait ImportFormat: Sync {
-    /// The name that people use.
+    /// The name of the format, for users.
     fn name(&self) -> &'static str;
-    /// How a recording of this format is recognised, for people.
+    /// The content by which a recording of this format is recognised, for users.
     fn expects(&self) -> &'static str;
     /// Whether `path` looks like this format.
     fn sniff(&self, path: &Path) -> bool;
@@ -117,11 +117,11 @@ pub trait ImportFormat: Sync {
 /// All formats, in the order in which they are tried.
 pub(crate) const FORMATS: [&dyn ImportFormat; 2] = [&kitti::Kitti, &pds3::Pds3];
 
-/// Where an importer writes images; it keeps account of progress, and removes all of them on failure.
+/// The destination of an importer's images; reports progress, and lists the files for removal on failure.
 pub struct Output<'a> {
     folder: &'a Path,
     existing: Existing,
-    /// Whether the recording is only examined: files are checked as far as that is quick, and nothing is written.
+    /// Whether the recording is only examined: files get only quick checks, and nothing is written.
     is_dry: bool,
     cancel: &'a AtomicBool,
     progress: &'a mut dyn FnMut(usize, usize),
@@ -131,7 +131,7 @@ pub struct Output<'a> {
 }
 
 impl Output<'_> {
-    /// Announces how many images will be written.
+    /// Announces the number of images that will be written.
     pub fn expect(&mut self, images: usize) {
         self.expected = images;
         (self.progress)(0, images);
@@ -140,8 +140,7 @@ impl Output<'_> {
     /// Writes one image file under `name`, a path relative to the folder with `/`.
     ///
     /// # Errors
-    /// [`Error::Cancelled`], a file that is there already and may not be replaced, or one that cannot be
-    /// written.
+    /// [`Error::Cancelled`], a file that exists and may not be replaced, or one that cannot be written.
     pub fn write(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
         self.check_cancelled()?;
         if self.is_dry {
@@ -183,27 +182,27 @@ impl Output<'_> {
         self.write(name, &bytes)
     }
 
-    /// Whether nothing is written, so that no image needs to be made.
+    /// Whether nothing is written, so that no image needs to be encoded.
     pub(crate) fn is_dry(&self) -> bool {
         self.is_dry
     }
 
-    /// Adds a sentence for the person about what was left out or assumed.
+    /// Adds a sentence for the user about an omission or an assumption.
     pub fn note(&mut self, note: impl Into<String>) {
         self.notes.push(note.into());
     }
 
     /// # Errors
-    /// [`Error::Cancelled`] when the person asked to stop.
+    /// [`Error::Cancelled`] if the user requested to stop.
     pub(crate) fn check_cancelled(&self) -> Result<()> {
         if self.cancel.load(Ordering::Relaxed) { Err(Error::Cancelled) } else { Ok(()) }
     }
 }
 
-/// Imports the recording at `path` into `folder`; `progress` is told (images written, images in all).
+/// Imports the recording at `path` into `folder`; `progress` receives (images written, images in total).
 ///
 /// # Errors
-/// An unknown format, a damaged recording, an output folder that holds a traverse or the recording itself, or
+/// An unknown format, a damaged recording, an output folder that contains a traverse or the recording itself, or
 /// [`Error::Cancelled`]. Files that this import wrote are removed.
 pub fn import(
     path: &Path,
@@ -235,9 +234,9 @@ pub fn import(
     });
     let index = index.inspect_err(|_| {
         for file in &output.written {
-            // The first error is the one to tell.
+            // The first error is the one to report.
             let _ = std::fs::remove_file(file);
-            // Fails, as it should, for a subfolder that holds other files.
+            // Fails, as intended, for a subfolder with other files.
             let _ = file.parent().filter(|parent| *parent != folder).map(std::fs::remove_dir);
         }
     })?;
@@ -247,7 +246,7 @@ pub fn import(
 /// The format of the recording at `path`.
 ///
 /// # Errors
-/// Nothing there, a native traverse, or a format that is not known: the sentence lists those that are.
+/// No such path, a native traverse, or an unknown format; the message lists the known ones.
 pub fn recognise(path: &Path) -> Result<&'static dyn ImportFormat> {
     if !path.exists() {
         return Err(Error::format(path, "does not exist"));
@@ -262,7 +261,7 @@ pub fn recognise(path: &Path) -> Result<&'static dyn ImportFormat> {
     })
 }
 
-/// Refuses an output folder that would overwrite a traverse or the recording itself.
+/// Rejects an output folder that would overwrite a traverse or the recording itself.
 fn check_folder(path: &Path, folder: &Path, existing: Existing) -> Result<()> {
     let source = if path.is_dir() { path } else { path.parent().unwrap_or(path) };
     if let (Ok(source), Ok(target)) = (source.canonicalize(), folder.canonicalize())

@@ -1,33 +1,33 @@
 //! Labels in ODL, the Object Description Language of PDS3 products.
 //!
-//! Source: domain.md 6.1, from the labels of real products. A label is a list of statements
-//! `KEY = VALUE`, grouped by `GROUP = NAME … END_GROUP` and `OBJECT = NAME … END_OBJECT`, and ends at the
-//! word `END`; pixels may follow it in the same file and are never looked at.
+//! Source: domain.md 6.1, from the labels of real products. A label is a list of statements `KEY = VALUE`, grouped by
+//! `GROUP = NAME … END_GROUP` and `OBJECT = NAME … END_OBJECT`, and ends at the word `END`; pixels may follow it in
+//! the same file and are ignored.
 //!
 //! - Values: numbers (also with a radix, `2#0000111111111111#`), quoted strings over several lines, bare
 //!   words, dates, tuples `( … )` and sets `{ … }` over several lines, nested; a unit `<rad>` after a number.
-//! - A value is kept as the text that was written: whether it is a number is decided by who asks, because
-//!   a bit mask without its radix (`0000111111111111`) is only understood beside the sample's width.
-//! - Keys may carry a caret (a pointer) or a namespace (`MSL:`); both spellings find the key.
-//! - The same group may appear several times; [`Group::last_group`] takes the last, which is how products
-//!   are corrected (files of inverse look-up tables append their camera model).
+//! - A value is kept as the text that was written: its caller decides whether it is a number, because a bit mask
+//!   without its radix (`0000111111111111`) can only be interpreted with the sample's width.
+//! - Keys may have a caret (a pointer) or a namespace (`MSL:`); a key is found with or without its namespace.
+//! - The same group may appear several times; [`Group::last_group`] returns the last, because products are corrected
+//!   by appending (files of inverse look-up tables append their camera model).
 //!
-//! The reader departs from the standard where real labels do: a statement without a value is absent, a
-//! comment without an end stops at its line's end, and bytes that are no UTF-8 are replaced. It refuses what
-//! would put data in the wrong place: a group that closes another, a string or tuple without an end, a label
-//! without `END`. It never panics, whatever the bytes (`arbitrary_bytes_never_panic`).
+//! The reader departs from the standard where real labels do: a statement without a value is absent, an unterminated
+//! comment ends with its line, and bytes that are not UTF-8 are replaced. It rejects errors that would put data in
+//! the wrong place: a group that closes another, an unterminated string or tuple, a label without `END`. It never
+//! panics, whatever the bytes (`arbitrary_bytes_never_panic`).
 
-/// The deepest nesting of groups, and of tuples, that is read.
+/// Largest nesting of groups, and of tuples, that is read.
 const DEPTH_LIMIT: usize = 16;
-/// The largest number of statements that is read.
+/// Largest number of statements that is read.
 const STATEMENT_LIMIT: usize = 50_000;
 
-/// What was wrong with a label.
+/// An error in a label.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct OdlProblem {
     /// The line, counted from 1.
     pub line: usize,
-    /// What is wrong there.
+    /// The problem on that line.
     pub problem: String,
 }
 
@@ -42,7 +42,7 @@ impl std::fmt::Display for OdlProblem {
 pub enum Value {
     /// A number, word, date or string.
     Scalar {
-        /// What was written, without quotation marks; line breaks in a string become one space.
+        /// The text as written, without quotation marks; line breaks in a string become one space.
         text: String,
         /// The unit that followed, without its angle brackets.
         unit: Option<String>,
@@ -79,12 +79,12 @@ impl Value {
         }
     }
 
-    /// Whether the scalar carries `unit`.
+    /// Whether the scalar has this unit.
     pub(crate) fn has_unit(&self, unit: &str) -> bool {
         matches!(self, Self::Scalar { unit: Some(own), .. } if own == unit)
     }
 
-    /// All elements as finite numbers; `None` where one is not.
+    /// All elements as finite numbers; `None` if one is not.
     pub fn numbers(&self) -> Option<Vec<f64>> {
         self.items().iter().map(Self::number).collect()
     }
@@ -96,7 +96,7 @@ fn number(text: &str) -> Option<f64> {
         let value = i64::from_str_radix(digits.strip_suffix('#')?, radix).ok()?;
         return Some(value as f64);
     }
-    // Rust reads "inf" and "nan" as numbers too; a label means words by them.
+    // Rust parses "inf" and "nan" as numbers too; in a label they are words.
     let starts_as_number = text.starts_with(|c: char| c.is_ascii_digit() || matches!(c, '+' | '-' | '.'));
     text.parse().ok().filter(|v: &f64| starts_as_number && v.is_finite())
 }
@@ -116,7 +116,7 @@ impl Group {
     /// Reads a label from the beginning of `bytes` up to its `END`.
     ///
     /// # Errors
-    /// The first line that cannot be understood, or a label that does not end.
+    /// The first line that cannot be parsed, or a label that does not end.
     pub fn parse(bytes: &[u8]) -> Result<Self, OdlProblem> {
         let mut reader = Reader { bytes, at: 0, line: 1 };
         let mut open = vec![Self::default()];
@@ -137,13 +137,13 @@ impl Group {
         Err(reader.problem(format!("more than {STATEMENT_LIMIT} statements")))
     }
 
-    /// The value of `key`, with or without its namespace; the last one where it is repeated.
+    /// The value of `key`, with or without its namespace; the last one if it is repeated.
     pub fn value(&self, key: &str) -> Option<&Value> {
         let matches = |k: &str| k == key || k.split_once(':').is_some_and(|(_, bare)| bare == key);
         self.statements.iter().rev().find(|(k, _)| matches(k)).map(|(_, value)| value)
     }
 
-    /// The text of `key`; `None` where it is missing, a list, or says that it is absent.
+    /// The text of `key`; `None` if it is missing, a list, or marked as absent.
     pub fn text(&self, key: &str) -> Option<&str> {
         self.value(key)?.text()
     }
@@ -164,7 +164,7 @@ impl Group {
     }
 }
 
-/// A place in the bytes of a label.
+/// A position in the bytes of a label.
 struct Reader<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -204,13 +204,13 @@ impl Reader<'_> {
         self.at += rest[..end_of_line].windows(2).position(|w| w == b"*/").map_or(end_of_line, |at| at + 2);
     }
 
-    /// Whether `byte` comes next after blanks; it stays there.
+    /// Whether `byte` is next after blanks; it is not consumed.
     fn next_is(&mut self, byte: u8) -> bool {
         self.skip_blank();
         self.peek() == Some(byte)
     }
 
-    /// A run of bytes up to a blank or a mark of the grammar; also a name in quotation marks.
+    /// A run of bytes up to a blank or a punctuation mark of the grammar; also a name in quotation marks.
     fn word(&mut self) -> Result<String, OdlProblem> {
         self.skip_blank();
         let start = self.at;
@@ -227,7 +227,7 @@ impl Reader<'_> {
         }
     }
 
-    /// A string in quotation marks; every run of blanks that holds a line break becomes one space.
+    /// A string in quotation marks; every run of blanks with a line break becomes one space.
     fn quoted(&mut self, quote: u8) -> Result<String, OdlProblem> {
         let opened = self.line;
         self.advance();
@@ -267,7 +267,7 @@ impl Reader<'_> {
             }
         }
         self.advance();
-        // A unit after the closing bracket belongs to all elements; no reader here asks for it.
+        // A unit after the closing bracket applies to all elements; no caller needs it.
         self.unit()?;
         Ok(Value::List(items))
     }
@@ -288,7 +288,7 @@ impl Reader<'_> {
         Ok(Some(String::from_utf8_lossy(&rest[..end]).trim().to_owned()))
     }
 
-    /// Reads what follows `key` and files it in the innermost open group.
+    /// Reads the rest of the statement of `key` into the innermost open group.
     fn statement(&mut self, key: String, open: &mut Vec<Group>) -> Result<(), OdlProblem> {
         if matches!(key.as_str(), "END_GROUP" | "END_OBJECT") {
             return self.close(&key, open);
@@ -302,7 +302,7 @@ impl Reader<'_> {
         let (start, start_line) = (self.at, self.line);
         let value = self.value(0)?;
         if start_line > line && self.next_is(b'=') {
-            // The value was left out and the next line's key was read in its place.
+            // The value is missing, and the next line's key was read in its place.
             (self.at, self.line) = (start, start_line);
             return Ok(());
         }

@@ -1,4 +1,4 @@
-//! Labels that are read, labels that are refused, and bytes that are neither.
+//! Labels that are read, labels that are rejected, and arbitrary bytes.
 
 use super::*;
 use proptest::prelude::*;

@@ -122,7 +122,7 @@ fn frames_of_a_sequence_can_be_chosen_and_start_a_site_of_their_own() {
     assert_eq!(traverse.index().stops[1].time_s, 2.5);
     assert_eq!(traverse.index().stops[1].left.image, "image_0/000003.png");
     let site_from_rover = traverse.true_site_from_rover(1).unwrap();
-    // Frame 1 looks 0.1 rad to the right of the way, so the way of 2 m leads to its left.
+    // Frame 1 points 0.1 rad to the right of the driven direction, so the motion of 2 m is to its left.
     let expected = Point3::new(2.0 * 0.1_f64.cos(), -2.0 * 0.1_f64.sin(), 0.0);
     assert!((site_from_rover * Point3::origin() - expected).norm() < 1e-12);
 }
@@ -154,7 +154,7 @@ fn the_estimate_is_the_truth_with_the_error_that_was_asked_for() {
         attitude += estimates(0.0, 0.2, seed)[3].rotation.angle().to_degrees().powi(2) / 20.0;
     }
     let expected = (0.02 * 3.0, 0.2 * 3.0);
-    // 180 squares of normal numbers spread by 11 %, so their root by 5 %.
+    // 180 squares of normal numbers have a relative spread of 11 %, so their root one of 5 %.
     assert!((position.sqrt() / expected.0 - 1.0).abs() < 0.15, "{}", position.sqrt());
     assert!((attitude.sqrt() / expected.1 - 1.0).abs() < 0.15, "{}", attitude.sqrt());
 }

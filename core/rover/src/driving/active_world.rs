@@ -1,4 +1,4 @@
-//! The world that a closed loop acts on. The simulator drives in it; a recording answers with its recorded data.
+//! The world that a closed loop acts on: the simulator drives in it, a recording returns its recorded data.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -17,60 +17,61 @@ use crate::visual_odometry::MeasuredMotion;
 
 /// A world in which the rover can be driven.
 pub trait ActiveWorld {
-    /// The stops driven to so far; of a recording all of them.
+    /// The stops driven so far; for a recording, all of them.
     fn stops(&self) -> &dyn Stops;
 
-    /// Drives one step from the last stop and adds the stop at which the rover comes to rest, its mast not pointed yet.
+    /// Drives one step from the last stop and adds the stop where the rover comes to rest; its mast is not pointed yet.
     ///
     /// # Errors
     /// [`sightline_geometry::error::Error::Cancelled`], or a world that cannot be driven further; no stop is added then.
     fn drive(&mut self, motion: &Motion, cancel: Cancel<'_>) -> Result<DriveReport>;
 
-    /// Adds a stop at which the rover stands as at the last one, for another pair.
+    /// Adds a stop at the same pose as the last one, for another pair.
     ///
     /// # Errors
     /// A world that cannot be continued, or a stop that cannot be stored.
     fn stay(&mut self) -> Result<()>;
 
-    /// Adds a stop at which the rover stands as at the last one, and this pair on the body takes over from the main one.
+    /// Adds a stop at the same pose as the last one, at which this pair on the body takes over from the main one
+    /// (hand-off).
     ///
     /// # Errors
     /// As [`Self::stay`].
     fn hand_over(&mut self, to: CameraName) -> Result<()>;
 
-    /// Keeps the decision that led to the last stop, with the report of the drive; it is stored with the stop. A recording was
-    /// driven by other decisions.
+    /// Stores the decision that led to the last stop, with the report of the drive, together with the stop. No effect for
+    /// a recording.
     fn keep_decision(&mut self, followed: &FollowedCycle<'_>);
 
-    /// Keeps how vision measured the motion to the last stop, and corrects the estimated pose there by it. A recording keeps
-    /// its poses.
+    /// Stores visual odometry's measurement of the motion to the last stop, and corrects the estimated pose there by it. A
+    /// recording keeps its poses.
     ///
     /// # Errors
     /// A stop that cannot be stored.
     fn correct(&mut self, measured: MeasuredMotion) -> Result<()>;
 
-    /// Leaves the last stop to visual odometry alone: the tracker does not look for its target there. A recording is tracked at
-    /// every stop.
+    /// Marks the last stop as used by visual odometry only: the tracker does not search for its target there. No effect
+    /// for a recording, which is tracked at every stop.
     ///
     /// # Errors
     /// A stop that cannot be stored.
     fn leave_to_odometry(&mut self) -> Result<()>;
 
-    /// Keeps at which target the mast of the last stop is pointed: another one that is out of view there is not searched. A
-    /// recording does not know it.
+    /// Stores the target at which the mast of the last stop is pointed: another target is not searched there if it is out
+    /// of view. No effect for a recording.
     ///
     /// # Errors
     /// A stop that cannot be stored.
     fn keep_mast_target(&mut self, target: Designation) -> Result<()>;
 
-    /// Points the mast of the last stop; `None` leaves it as it is.
+    /// Points the mast of the last stop; `None` leaves it unchanged.
     ///
     /// # Errors
     /// A stop that cannot be stored.
     fn point_mast(&mut self, angles: Option<MastAngles>) -> Result<()>;
 
-    /// Takes a pair of its own for visual odometry at the last stop ([`CameraName::ODOMETRY`]), the mast at these angles, in the
-    /// place of one that is there. A recording has the pairs that were recorded.
+    /// Takes an additional pair for visual odometry at the last stop ([`CameraName::ODOMETRY`]), with the mast at these
+    /// angles; replaces an existing one. A recording contains only its recorded pairs.
     ///
     /// # Errors
     /// A stop that cannot be stored.
@@ -78,17 +79,17 @@ pub trait ActiveWorld {
     /// [`CameraName::ODOMETRY`]: sightline_geometry::camera::CameraName::ODOMETRY
     fn look(&mut self, angles: MastAngles) -> Result<()>;
 
-    /// Puts the exposure subframe of the last stop around a pixel of the left image (R79); `None` leaves it where it is.
+    /// Centres the exposure subframe of the last stop on a pixel of the left image (R79); `None` leaves it unchanged.
     ///
     /// # Errors
     /// A stop that cannot be stored.
     fn expose(&mut self, around: Option<Pixel>) -> Result<()>;
 }
 
-/// A decision that was followed.
+/// An executed decision.
 #[derive(Clone, Copy, Debug)]
 pub struct FollowedCycle<'a> {
-    /// The target on whose estimates the rover moved.
+    /// The target of the drive.
     pub designation: Designation,
     /// The command.
     pub command: &'a DriveCommand,
@@ -96,22 +97,22 @@ pub struct FollowedCycle<'a> {
     pub cycle: &'a Cycle,
 }
 
-/// What the rover reports of one step.
+/// The rover's report of one step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct DriveReport {
     /// Length of the wheels' path, m.
     pub wheels_m: f64,
     /// Duration, s.
     pub duration_s: f64,
-    /// Angle between the rover's vertical and that of the site after the step, by the accelerometers, deg.
+    /// Tilt after the step from the accelerometers: angle between the vertical axes of rover and site, deg.
     pub tilt_deg: f64,
-    /// Why the wheels did not complete the step; null where they did.
+    /// Why the wheels did not complete the step; null if they did.
     pub stall: Option<Stall>,
 }
 
 /// A wheel that met a step too high to climb.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Stall {
-    /// Part of the commanded motion that was completed, 0 to 1.
+    /// Completed fraction of the commanded motion, 0 to 1.
     pub completed: f64,
 }

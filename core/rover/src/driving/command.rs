@@ -1,4 +1,4 @@
-//! The command of a targeted drive: standoff, offset, limits and actions after arrival (R5–R8). The target is that of the run.
+//! The command of a targeted drive: standoff, offset, limits, actions after arrival (R5–R8). The target is that of the run.
 
 use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::ToSchema;
@@ -21,7 +21,7 @@ pub enum GoalRule {
     /// Each tracking update moves the goal with the target (R6).
     #[default]
     FollowsTarget,
-    /// The goal stays where the designation put it: the baseline, on which tracking has no influence (R8, R96).
+    /// The goal stays at its position from the designation: the baseline, independent of tracking (R8, R96).
     Fixed,
 }
 
@@ -37,14 +37,14 @@ pub enum TrackedStops {
     ByDistance,
 }
 
-/// The motion that the measured one is compared with for the slip that may end a drive.
+/// The reference motion of the slip that may end a drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SlipCheck {
-    /// What the wheels have driven.
+    /// The motion that the wheels have driven.
     #[default]
     Wheels,
-    /// The whole commanded motion, also where the rover ended it early because its time was used up.
+    /// The whole commanded motion, even if the rover ended it early because its time was used up.
     Command,
 }
 
@@ -72,12 +72,12 @@ impl NavigatorKind {
         }
     }
 
-    /// Whether it needs a hazard map.
+    /// Whether the navigator needs a hazard map.
     pub fn needs_map(self) -> bool {
         self != Self::Arcs
     }
 
-    /// Its name in a command.
+    /// Name in a command.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Arcs => "arcs",
@@ -93,23 +93,24 @@ impl NavigatorKind {
 pub enum ArrivalAction {
     /// Points the mast at the located target, takes another pair and locates the target in it.
     Look,
-    /// Drives on to `final_standoff_m` from the target, into the workspace of the arm: by arcs, and with a hazard map only where
-    /// nothing on it under wheels and body is too high (`no_safe_path`). The next action follows when the rover is there.
+    /// Drives to `final_standoff_m` from the target, into the workspace of the arm, by arcs; with a hazard map only if
+    /// nothing under wheels and body is too high (`no_safe_path`). The next action follows on arrival.
     Approach,
-    /// Locates the target in the pair on the body, near the arm: that of `hazard_cameras`, or the first one that looks ahead (R205).
+    /// Locates the target in the pair on the body, near the arm: that of `hazard_cameras`, or the first forward-looking
+    /// one (R205).
     HandOff,
 }
 
-/// Most pairs of the hazard map.
+/// Largest number of pairs for the hazard map.
 pub const HAZARD_CAMERAS_MAX: usize = 4;
 
-/// Most actions after arrival.
+/// Largest number of actions after arrival.
 const ACTIONS_MAX: usize = 10;
 
-/// Most targets to which the rover drives afterwards.
+/// Largest number of waiting targets.
 pub const WAITING_MAX: usize = 20;
 
-/// Most motions of a directed drive, and the longest of them, m.
+/// Largest number of motions of a directed drive, and the largest length of one, m.
 const MOTIONS_MAX: usize = 200;
 const MOTION_MAX_M: f64 = 20.0;
 
@@ -121,60 +122,60 @@ pub struct DriveCommand {
     pub standoff_m: f64,
     /// Added to the goal, x and y of the site frame, m (0, 0; −20 to 20).
     pub offset_m: [f64; 2],
-    /// The stop at which the rover was sent to this target, from whose place the goal is approached (null: that of the
-    /// designation). A later target of a drive to several has it.
+    /// The stop at which the drive to this target began, from whose pose the goal is approached (null: that of the
+    /// designation). Set for a later target of a drive to several.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub since: Option<usize>,
     /// Whether tracking moves the goal (`follows_target`).
     pub goal: GoalRule,
-    /// The rover has arrived when its frame's origin is nearer to the goal than this, horizontally, m (0.05: ours; 0.001 to 1).
+    /// The rover has arrived when its frame's origin is within this horizontal distance of the goal, m (0.05: ours; 0.001
+    /// to 1).
     pub tolerance_m: f64,
-    /// Longest step as a part of the distance to the target (0.10: Kim09 §5.4; 0.01 to 0.5).
+    /// Longest step as a fraction of the distance to the target (0.10: Kim09 §5.4; 0.01 to 0.5).
     pub step_fraction: f64,
-    /// The stops at which the target is looked for (`every`). Without odometry it has no effect.
+    /// The stops at which the target is searched (`every`). No effect without odometry.
     pub tracked_stops: TrackedStops,
-    /// Most stops, the first included, looks at waiting targets left out (100; 2 to 1000).
+    /// Largest number of stops, including the first, excluding looks at waiting targets (100; 2 to 1000).
     pub stops_max: u32,
-    /// What visual odometry is used for (`full`).
+    /// Use of visual odometry (`full`).
     pub odometry: OdometryMode,
-    /// The pairs in which it measures the motion (`shared`).
+    /// The pairs in which visual odometry measures the motion (`shared`).
     pub odometry_pair: OdometryPair,
-    /// Its settings (`sightline`).
+    /// Preset of visual odometry's settings (`sightline`).
     pub odometry_preset: OdometryPreset,
     /// The navigator (`arcs`).
     pub navigator: NavigatorKind,
-    /// The pairs of every stop whose images give the hazard map, by their names (none: the first pair on the body that looks ahead;
-    /// 4 at most). The target is handed over to the first of them that is on the body, too (`on_arrival`). With `arcs`, and without
-    /// a hand-off, it has no effect. Older files have `hazard_camera`: one name, or null.
+    /// Names of the pairs of every stop for the hazard map (none: the first forward-looking pair on the body; at most 4).
+    /// The first of them on the body is also the one to which the target is handed off (`on_arrival`). No effect with
+    /// `arcs` and without a hand-off. Older files contain `hazard_camera`: one name, or null.
     #[serde(alias = "hazard_camera", deserialize_with = "names")]
     pub hazard_cameras: Vec<CameraName>,
     /// Ground nearer to the target counts as good on the hazard map, m (0: none; 0 to 5; Kim09 §6).
     pub exemption_radius_m: f64,
-    /// The drive stops when the slip of a step is measured as larger, as a part of the wheels' motion (0.9; 0.05 to 2). Without
-    /// odometry it has no effect.
+    /// The drive stops when the measured slip ratio of a step exceeds this (0.9; 0.05 to 2). No effect without odometry.
     pub slip_max: f64,
-    /// The motion that the slip is a part of (`wheels`).
+    /// The motion to which the slip ratio refers (`wheels`).
     pub slip_check: SlipCheck,
     /// The drive stops when visual odometry has refused more motions in a row than this (null: it never does; 0 to 1000). Without
     /// odometry it has no effect.
     pub refusals_max: Option<u32>,
     /// The drive stops when the rover tilts by more than this, deg (30: domain.md 5.4; 1 to 45).
     pub tilt_max_deg: f64,
-    /// The drive stops after this much time on Mars, min (480; 1 to 10,000). A motion during which it is used up is ended early.
+    /// The drive stops after this time on Mars, min (480; 1 to 10,000). A motion that would exceed it is ended early.
     pub flight_minutes_max: f64,
-    /// Motions that are driven one after the other, as they are, instead of those to the goal: directed driving (none; 200 at most).
-    /// The drive has then ended with the last of them, and the target is tracked along.
+    /// Motions to drive in order, unchanged, instead of those to the goal: directed driving (none; at most 200). The drive
+    /// ends after the last of them; the target is tracked meanwhile.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub motions: Vec<Motion>,
-    /// The targets to which the rover drives afterwards (none; 20 at most). The server and the command line put them here from their
-    /// list; those of a request are ignored.
+    /// The targets to which the rover drives afterwards (none; at most 20). Filled in by the server and the command line
+    /// from their list; those of a request are ignored.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub waiting: Vec<WaitingTarget>,
-    /// Whether the mast also looks at a waiting target, at a stop of its own, once the rover has moved by `step_fraction` of the distance
-    /// to it since it was last in view (true).
+    /// Whether the mast also looks at a waiting target, at a separate stop, once the rover has moved by `step_fraction` of
+    /// the distance to it since it was last in view (true).
     pub look_at_waiting: bool,
-    /// Actions after arrival, in this order (none; 10 at most). A look and the hand-off are one more stop each, at which the rover
-    /// stays.
+    /// Actions after arrival, in order (none; at most 10). A look and the hand-off add one stop each, at which the rover
+    /// does not move.
     pub on_arrival: Vec<ArrivalAction>,
     /// Horizontal distance of the goal from the target in an `approach` after arrival, m (1.3: ours, from where the arm reaches the
     /// target; 0.3 to 50).
@@ -212,7 +213,7 @@ impl Default for DriveCommand {
     }
 }
 
-/// Names as a list, as one name, or as null for none.
+/// Names as a list, as one name, or null for none.
 fn names<'de, D: Deserializer<'de>>(document: D) -> std::result::Result<Vec<CameraName>, D::Error> {
     #[derive(Deserialize)]
     #[serde(untagged, expecting = "a list of names of cameras, each of 1 to 32 characters of a-z, 0-9 and _")]
@@ -227,10 +228,10 @@ fn names<'de, D: Deserializer<'de>>(document: D) -> std::result::Result<Vec<Came
 }
 
 impl DriveCommand {
-    /// Refuses values out of range.
+    /// Rejects values out of range.
     ///
     /// # Errors
-    /// [`Error::Setting`] that names the field and its range.
+    /// [`Error::Setting`] with the field and its range.
     pub fn validate(&self) -> Result<()> {
         let within = |key: &str, value: f64, low: f64, high: f64| {
             if (low..=high).contains(&value) {
@@ -314,13 +315,13 @@ impl DriveCommand {
         Err(Error::setting("on_arrival", problem))
     }
 
-    /// The horizontal distance of the goal from the target, m, after so many actions after arrival were begun.
+    /// Horizontal distance of the goal from the target, m, after `actions` actions after arrival have begun.
     pub(crate) fn standoff_after_m(&self, actions: u32) -> f64 {
         let begun = &self.on_arrival[..(actions as usize).min(self.on_arrival.len())];
         if begun.contains(&ArrivalAction::Approach) { self.final_standoff_m } else { self.standoff_m }
     }
 
-    /// Whether the rover is on its way to the final standoff after so many actions, if it is not at its goal.
+    /// Whether the last of these begun actions is an approach to the final standoff.
     pub fn is_approach(&self, actions: u32) -> bool {
         let last = (actions as usize).checked_sub(1).and_then(|last| self.on_arrival.get(last));
         last == Some(&ArrivalAction::Approach)
@@ -340,10 +341,10 @@ impl DriveCommand {
         goal(self) == goal(other)
     }
 
-    /// Refuses a command that makes no sense for a target at this position in the rover frame of the designation.
+    /// Rejects a command that is impossible for a target at this position in the rover frame of the designation.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a target behind the rover or nearer than the standoff, where it is the first one.
+    /// [`Error::Setting`] if the first target is behind the rover or nearer than the standoff.
     pub fn validate_for(&self, target_in_rover: &Point3) -> Result<()> {
         self.validate()?;
         if self.since.is_some() || self.is_directed() {

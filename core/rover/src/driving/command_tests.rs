@@ -1,4 +1,4 @@
-//! Tests of drive commands: values that are refused, and files of earlier versions.
+//! Tests of drive commands: rejected values, and files of earlier versions.
 
 use super::*;
 

@@ -1,4 +1,4 @@
-//! Where the rover is in the level, and how well that is known: by its pose estimates, and by its wheels alone.
+//! Horizontal dead reckoning with covariance: by the pose estimates, and by the wheels alone.
 //!
 //! The covariance of x, y and heading grows from step to step by the error model of the odometry:
 //!
@@ -7,7 +7,8 @@
 //! F  = [1 0 −Δy; 0 1 Δx; 0 0 1]      G = the axes along and across the step, and the heading
 //! ```
 //!
-//! A step that vision measured adds `M Σ Mᵀ` instead, where M takes its error (τ, ω) from the rover frame to x, y and heading.
+//! A step measured by visual odometry adds `M Σ Mᵀ` instead, where M maps its error (τ, ω) from the rover frame to x, y
+//! and heading.
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
@@ -25,7 +26,7 @@ use sightline_geometry::odometry_error::{OdometryError, PoseChangeError};
 
 use super::motion::Motion;
 
-/// A place of the rover in the level, with its covariance.
+/// Horizontal pose of the rover with its covariance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Reckoned {
     /// x and y of the rover's origin, site frame, m.
@@ -37,14 +38,14 @@ pub struct Reckoned {
 }
 
 impl Reckoned {
-    /// A place that is known exactly: that of the first stop.
+    /// A pose without uncertainty: that of the first stop.
     pub(super) fn exactly(pose: &Pose) -> Self {
         let origin = pose.translation.vector;
         let heading_rad = pose.rotation.euler_angles().2;
         Self { position_m: [origin.x, origin.y], heading_rad, covariance: [[0.0; 3]; 3] }
     }
 
-    /// The place at the next stop by the pose estimated there.
+    /// The pose at the next stop, from the pose estimated there.
     pub(super) fn at(&self, pose: &Pose, error: &PoseChangeError) -> Self {
         let there = Self::exactly(pose);
         let covariance = match error {
@@ -60,7 +61,7 @@ impl Reckoned {
         Self { covariance, ..there }
     }
 
-    /// The place after wheels have done a part of a motion, as on level ground without slip.
+    /// The pose after a fraction of a motion of the wheels, as on level ground without slip.
     pub(super) fn rolled(&self, motion: &Motion, part: f64, error: &OdometryError) -> Self {
         let ([ahead_m, right_m], turned_rad) = motion.after(part);
         let (sine, cosine) = self.heading_rad.sin_cos();
@@ -72,7 +73,7 @@ impl Reckoned {
         Self { position_m, heading_rad, covariance: self.grown(position_m, error) }
     }
 
-    /// The covariance after a step to a place.
+    /// The covariance after a step, by the odometry's error model.
     fn grown(&self, to_m: [f64; 2], error: &OdometryError) -> [[f64; 3]; 3] {
         let step = Vector2::from(to_m) - Vector2::from(self.position_m);
         let length_m = step.norm();
@@ -87,7 +88,7 @@ impl Reckoned {
         self.grown_by(to_m, axes * added * axes.transpose())
     }
 
-    /// The covariance after a step to a place that adds an error of its own.
+    /// The covariance after a step that adds the covariance `added`.
     fn grown_by(&self, to_m: [f64; 2], added: Matrix3<f64>) -> [[f64; 3]; 3] {
         let step = Vector2::from(to_m) - Vector2::from(self.position_m);
         let carried = Matrix3::new(1.0, 0.0, -step.y, 0.0, 1.0, step.x, 0.0, 0.0, 1.0);

@@ -1,16 +1,16 @@
-//! Why a drive ends: the checks of a stop, in their order.
+//! Why a drive ends: the checks at a stop, in order.
 //!
 //! | order | reason | check |
 //! |---|---|---|
-//! | 1 | `arrived` | distance to the goal within the tolerance, or an action after arrival was begun |
-//! | 1 | `completed` | in its place in a directed drive: all its motions were driven |
-//! | 2 | `lost` | the tracker gave the target up, and the goal follows it; not in a directed drive |
-//! | 3 | `stalled` | a wheel stalled on the way to this stop |
+//! | 1 | `arrived` | distance to the goal within the tolerance, or an action after arrival has begun |
+//! | 1 | `completed` | instead of `arrived` in a directed drive: all its motions are driven |
+//! | 2 | `lost` | the tracker has given the target up, and the goal follows it; not in a directed drive |
+//! | 3 | `stalled` | a wheel stalled on the motion to this stop |
 //! | 4 | `slip` | measured slip of the motion to this stop against `slip_max`, of what `slip_check` names |
 //! | 5 | `odometry_refused` | consecutive refused updates of visual odometry against `refusals_max` |
 //! | 6 | `tilt` | tilt against `tilt_max_deg` |
-//! | 7 | `time` | time on Mars against `flight_minutes_max`; again with that of the hazard map (`executive.rs`) |
-//! | 8 | `stop_limit` | number of stops, looks at waiting targets left out, against `stops_max` |
+//! | 7 | `time` | time on Mars against `flight_minutes_max`; again including the hazard map's (`executive.rs`) |
+//! | 8 | `stop_limit` | number of stops, excluding looks at waiting targets, against `stops_max` |
 //! | 9 | `limit_cycle` | visits to this place (`limit_cycle.rs`); not in a directed drive |
 //!
 //! The remaining reasons follow from the selection of the path (`next_motion.rs`).
@@ -36,32 +36,32 @@ pub enum StopReason {
     Arrived,
     /// All motions of a directed drive were driven.
     Completed,
-    /// The tracker gave the target up.
+    /// The tracker has given the target up.
     Lost,
     /// A wheel met a step too high to climb.
     Stalled,
-    /// The wheels slipped more than allowed.
+    /// The slip ratio exceeded its limit.
     Slip,
-    /// Visual odometry refused its motion too often in a row.
+    /// Visual odometry refused too many motions in a row.
     OdometryRefused,
-    /// The rover tilts more than allowed.
+    /// The tilt exceeds its limit.
     Tilt,
     /// The time on Mars is used up.
     Time,
     /// The number of stops is used up.
     StopLimit,
-    /// The rover has come back to one place again and again.
+    /// The rover has returned to one place too often.
     LimitCycle,
     /// Every path is vetoed by the hazard map.
     NoSafePath,
-    /// The rover cannot reach its goal, and is about as near to it as it can be.
+    /// The rover cannot reach its goal, and is about as near to it as possible.
     GoalBlocked,
     /// The pair of the hazard map is missing, or gives too few points.
     NoRangeData,
 }
 
 impl StopReason {
-    /// Whether it concerns one target alone: another one can be driven to from there.
+    /// Whether the reason concerns one target only: the drive may go on to another one.
     pub const fn is_of_target(self) -> bool {
         matches!(
             self,
@@ -74,7 +74,7 @@ impl StopReason {
         )
     }
 
-    /// The reason in words.
+    /// Name of the reason.
     pub const fn word(self) -> &'static str {
         match self {
             Self::Arrived => "arrived",
@@ -99,19 +99,21 @@ impl StopReason {
 pub struct Ending {
     /// Why it stopped.
     pub reason: StopReason,
-    /// The value that decided, in the unit of its limit: m, a part, deg, min, a count; null for `completed`, `lost`, `stalled`,
-    /// `limit_cycle` and `no_safe_path`, and for a missing pair; of `goal_blocked` that of the ground at the goal.
+    /// The deciding value, in the unit of its limit: m, a fraction, deg, min, a count; null for `completed`, `lost`,
+    /// `stalled`, `limit_cycle` and `no_safe_path`, and for a missing pair; for `goal_blocked` that of the ground at the
+    /// goal.
     pub value: Option<f64>,
-    /// The limit that it met; null where `value` is.
+    /// The limit of the value; null if the value is.
     pub limit: Option<f64>,
-    /// Details: of `no_safe_path` the smallest change of a limit that opens a path, of `goal_blocked` why the goal cannot be reached, of
-    /// `no_range_data` why there are none, of `limit_cycle` the stops at one place; null for the other reasons.
+    /// Details: for `no_safe_path` the smallest change of a limit that opens a path, for `goal_blocked` why the goal
+    /// cannot be reached, for `no_range_data` why there are none, for `limit_cycle` the stops at one place; null for the
+    /// other reasons.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub detail: Option<String>,
 }
 
 impl Ending {
-    /// An end for a value beyond its limit.
+    /// An end because a value is beyond its limit.
     pub(super) fn beyond(reason: StopReason, value: f64, limit: f64) -> Self {
         Self { reason, value: Some(value), limit: Some(limit), detail: None }
     }
@@ -122,7 +124,7 @@ impl Ending {
     }
 }
 
-/// Why the drive ends at this stop, if it does.
+/// The end of the drive at this stop; `None` if it goes on.
 pub(super) fn ending(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &Cycle) -> Option<Ending> {
     let command = input.command;
     let end = |reason, value: f64, limit: f64| Some(Ending::beyond(reason, value, limit));
@@ -130,13 +132,13 @@ pub(super) fn ending(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &Cycle) -
     if has_driven_all(input, cycle) {
         return named(StopReason::Completed);
     }
-    // A later look may put the goal a little elsewhere; the rover has arrived all the same.
+    // A later look may move the goal slightly; the rover still counts as arrived.
     let is_at_goal = cycle.goal.arrived && input.last.why_not_searched().is_none();
     let has_acted = cycle.arrival_actions > 0 && !command.is_approach(cycle.arrival_actions);
     if !command.is_directed() && (is_at_goal || has_acted) {
         return end(StopReason::Arrived, cycle.goal.distance_m, command.tolerance_m);
     }
-    // The baseline drives on whatever tracking makes of it.
+    // The baseline drives on regardless of the tracker.
     let follows = command.goal == GoalRule::FollowsTarget && !command.is_directed();
     if follows && input.last.update.state == TrackingState::Failed {
         return named(StopReason::Lost);
@@ -172,13 +174,13 @@ pub(super) fn ending(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &Cycle) -
         .then(|| Ending::named(StopReason::LimitCycle, Some(limit_cycle::sentence(&visits))))
 }
 
-/// The end of a drive that has taken this time on Mars, min, if that is more than its command allows.
+/// The end of a drive if its time on Mars, min, exceeds the command's limit.
 pub(super) fn time_up(command: &DriveCommand, minutes: f64) -> Option<Ending> {
     let most = command.flight_minutes_max;
     (minutes > most).then(|| Ending::beyond(StopReason::Time, minutes, most))
 }
 
-/// Whether all motions of a directed drive were driven; one that a rock or the time cut off has its own reason.
+/// Whether all motions of a directed drive are driven; one cut off by a rock or by time has its own reason.
 pub(super) fn has_driven_all(input: &CycleInput<'_>, cycle: &Cycle) -> bool {
     let is_whole = |before: &Cycle| {
         before.time_up_after.is_none() && before.report.is_none_or(|report| report.stall.is_none())
@@ -195,18 +197,18 @@ pub fn visits(stops: &dyn Stops, [first, last]: [usize; 2]) -> Vec<usize> {
     limit_cycle::visits(&poses).into_iter().map(|index| first + index).collect()
 }
 
-/// Number of consecutive motions up to the stop `last` that visual odometry refused, those to `first` not included.
+/// Number of consecutive motions up to the stop `last` that visual odometry refused, excluding the motion to `first`.
 pub fn refusals(stops: &dyn Stops, [first, last]: [usize; 2]) -> usize {
     let measured = (first + 1..=last).rev().filter_map(|step| stops.measured_motion(step));
     measured.take_while(|measured| !measured.update.accepted).count()
 }
 
-/// The slip that the check compares, of the motion after a decision.
+/// The slip ratio to check, for the motion after a decision.
 fn checked_slip(stops: &dyn Stops, before: &Cycle, check: SlipCheck) -> Option<f64> {
     let slip = slip_to(stops, before.step + 1)?;
     Some(match check {
         SlipCheck::Wheels => slip,
-        // What the wheels did not drive counts as slip.
+        // The part that the wheels did not drive counts as slip.
         SlipCheck::Command => 1.0 - (1.0 - slip) * before.time_up_after.unwrap_or(1.0),
     })
 }

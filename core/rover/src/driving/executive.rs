@@ -32,36 +32,37 @@ use super::waiting;
 use crate::pipeline::{self, StepChanges, Stops};
 use crate::visual_odometry::pose_change_error;
 
-/// The decision at a stop, made once the target is located there.
+/// The decision at a stop, made after the target is located there.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Cycle {
-    /// The number of the stop.
+    /// Index of the stop.
     pub step: usize,
     /// The goal.
     pub goal: Goal,
-    /// The pose estimate in the level, with its covariance since the designation.
+    /// The horizontal pose estimate, with its covariance since the designation.
     pub estimated: Reckoned,
-    /// The place by the wheels alone, with its covariance since the designation.
+    /// The horizontal pose by the wheels alone, with its covariance since the designation.
     pub by_wheels: Reckoned,
-    /// The chosen motion; null where the drive ended or the rover stays.
+    /// The chosen motion; null if the drive ended or the rover stays.
     pub motion: Option<Motion>,
-    /// Part of the motion after which the time of the command was used up and the rover stopped, 0 to 1; null where it was not.
+    /// Fraction of the motion after which the command's time was used up and the rover stopped, 0 to 1; null if it was
+    /// not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_up_after: Option<f64>,
-    /// Whether odometry runs alone at the stop that the motion leads to: it is a part of a step.
+    /// Whether only visual odometry runs at the stop that the motion leads to, because it is part of a step.
     #[serde(default)]
     pub odometry_alone: bool,
     /// Number of points that the pair of the hazard map gives at this stop; null without a hazard map.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub range_points: Option<usize>,
-    /// Every path that was considered on the hazard map; null where no path was chosen on one.
+    /// Every path that was considered on the hazard map; null if no path was chosen on one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub choice: Option<PathChoice>,
     /// The rover's report of the motion; null without one.
     pub report: Option<DriveReport>,
-    /// Actions after arrival that were begun, the one decided here included.
+    /// Number of actions after arrival that have begun, including the one decided here.
     pub arrival_actions: u32,
-    /// Motions of a directed drive that were begun, the one decided here included.
+    /// Number of motions of a directed drive that have begun, including the one decided here.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub motions_begun: u32,
     /// The waiting target at which the mast looks next, while the rover stays; null for none.
@@ -74,29 +75,29 @@ pub struct Cycle {
     pub flight: FlightTime,
     /// Time on Mars up to the end of this stop's drive, min.
     pub flight_minutes: f64,
-    /// The end of the drive; null where it goes on.
+    /// The end of the drive; null if it goes on.
     pub ending: Option<Ending>,
 }
 
-/// What a cycle needs besides the world.
+/// Inputs of a cycle besides the world.
 #[derive(Clone, Copy)]
 pub struct CycleInput<'a> {
     /// The command.
     pub command: &'a DriveCommand,
-    /// Chooses the motions.
+    /// The navigator that chooses the motions.
     pub navigator: &'a dyn Navigator,
     /// The step at which the target was designated.
     pub first: &'a StepTrace,
-    /// The step of the stop at which is decided.
+    /// The step of the stop at which the decision is made.
     pub last: &'a StepTrace,
-    /// The cycle of the stop before; `None` at the first.
+    /// The cycle of the previous stop; `None` at the first.
     pub before: Option<&'a Cycle>,
     /// The goodness map of the stop, from `HazardMaps::at`; `None` for a navigator without one.
     pub hazards: Option<&'a StopHazards>,
 }
 
 impl CycleInput<'_> {
-    /// The stop at which the rover was sent to this target.
+    /// The stop at which the drive to this target began.
     pub fn since(&self) -> usize {
         self.command.since.unwrap_or(self.first.step)
     }
@@ -105,8 +106,8 @@ impl CycleInput<'_> {
 /// One cycle: decides at the last stop and, unless the drive ends there, drives, points the mast and tracks at the next.
 ///
 /// # Errors
-/// [`sightline_geometry::error::Error::Cancelled`], or what the world cannot do; the world may then have one stop more than
-/// steps, which is to be discarded.
+/// [`sightline_geometry::error::Error::Cancelled`], or a failure of the world; the world may then have one stop more than
+/// there are steps, which must be discarded.
 pub fn advance(
     world: &mut dyn ActiveWorld,
     input: &CycleInput<'_>,
@@ -128,8 +129,8 @@ pub fn advance(
     Ok((cycle, Some(trace)))
 }
 
-/// Measures the motion to the last stop by vision and points the mast there. Where the pair of the tracker serves both, its
-/// mast is pointed by the wheels.
+/// Measures the motion to the last stop by visual odometry and points the mast there. If the tracker's pair serves both,
+/// the mast is pointed by the wheels' pose estimate.
 fn arrive(world: &mut dyn ActiveWorld, input: &CycleInput<'_>, cancel: Cancel<'_>) -> Result<()> {
     let step = input.last.step + 1;
     let is_before = input.command.odometry_pair == OdometryPair::Own;
@@ -143,7 +144,7 @@ fn arrive(world: &mut dyn ActiveWorld, input: &CycleInput<'_>, cancel: Cancel<'_
     if is_before { Ok(()) } else { odometry::run(world, input.command, step, cancel) }
 }
 
-/// Decides at the last stop and, unless the drive ends there, drives to the next, where the mast is not pointed yet.
+/// Decides at the last stop and, unless the drive ends there, drives to the next, without pointing the mast.
 ///
 /// # Errors
 /// As [`advance`].
@@ -180,8 +181,8 @@ pub fn drive(world: &mut dyn ActiveWorld, input: &CycleInput<'_>, cancel: Cancel
     Ok(cycle)
 }
 
-/// The decision at a stop, before the rover moves; it depends on nothing but estimates and reports, so that it can be made
-/// again at any time.
+/// The decision at a stop, before the rover moves; it depends only on estimates and reports, so that it can be repeated at
+/// any time.
 pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
     let step = input.last.step;
     let pose = stops.site_from_rover(step);
@@ -217,7 +218,7 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
         ending: None,
     };
     if input.last.is_out_of_view() {
-        // Look at a waiting target that is due, otherwise back at the present one.
+        // Look at a waiting target that is due, otherwise back at the current one.
         cycle.ending = ending(stops, input, &cycle);
         cycle.looks_at = looks_at(stops, input, &cycle);
         return cycle;
@@ -239,14 +240,14 @@ pub fn decide(stops: &dyn Stops, input: &CycleInput<'_>) -> Cycle {
     cycle
 }
 
-/// The waiting target that the mast looks at before the rover moves.
+/// The waiting target at which the mast looks before the rover moves.
 fn looks_at(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &Cycle) -> Option<Designation> {
     let may_look = cycle.ending.is_none() && !input.last.is_odometry_alone();
     let due = waiting::due(stops, input.command, cycle.step).filter(|_| may_look)?;
     Some(due.designation)
 }
 
-/// Begins the next action after arrival, if the rover has arrived and one is left.
+/// Begins the next action after arrival, if the rover has arrived and an action is left.
 fn begin_action(input: &CycleInput<'_>, cycle: &mut Cycle) {
     let is_there = if input.command.is_directed() {
         has_driven_all(input, cycle)
@@ -267,7 +268,7 @@ fn choose_motion(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &mut Cycle, t
         cycle.motions_begun += 1;
         return;
     }
-    // Where odometry alone brought the rover to the goal, it stays for the tracker.
+    // If odometry alone brought the rover to the goal, it stays for the tracker.
     if !cycle.goal.arrived {
         let target_in_rover = stops.site_from_rover(cycle.step).inverse_transform_point(target_in_site);
         let distance_m = (target_in_rover - stops.cameras(cycle.step).0.model.centre()).norm();
@@ -290,11 +291,11 @@ fn is_zero(count: &u32) -> bool {
     *count == 0
 }
 
-/// The place at this stop by the pose estimates and by the wheels alone.
+/// The pose at this stop by the pose estimates and by the wheels alone.
 fn reckoned(stops: &dyn Stops, input: &CycleInput<'_>, pose: &Pose) -> [Reckoned; 2] {
     let Some(before) = input.before else { return [Reckoned::exactly(pose); 2] };
     let (Some(motion), Some(report)) = (&before.motion, &before.report) else {
-        // The rover stayed.
+        // The rover has not moved.
         return [before.estimated, before.by_wheels];
     };
     let part = before.time_up_after.unwrap_or(1.0) * report.stall.map_or(1.0, |stall| stall.completed);
@@ -303,7 +304,7 @@ fn reckoned(stops: &dyn Stops, input: &CycleInput<'_>, pose: &Pose) -> [Reckoned
 }
 
 impl Cycle {
-    /// Adds what the rover reports of its motion.
+    /// Adds the rover's report of its motion.
     pub fn add(&mut self, report: DriveReport) {
         self.flight.drive_s = report.duration_s;
         self.flight_minutes += report.duration_s / 60.0;
@@ -311,7 +312,7 @@ impl Cycle {
     }
 }
 
-/// The target from which the goal follows, site frame.
+/// The target position that determines the goal, site frame.
 fn target_in_site(input: &CycleInput<'_>, stops: &dyn Stops) -> Point3 {
     let from = match input.command.goal {
         GoalRule::FollowsTarget => input.last,
@@ -320,8 +321,8 @@ fn target_in_site(input: &CycleInput<'_>, stops: &dyn Stops) -> Point3 {
     stops.site_from_rover(from.step) * from.update.target.position_in_rover
 }
 
-/// Points the mast of the last stop at the prediction from the stop before, or at the waiting target that it is to look at, and exposes
-/// around it.
+/// Points the mast of the last stop at the predicted target, or at the waiting target to look at, and centres the exposure
+/// subframe on it.
 ///
 /// # Errors
 /// A stop that cannot be stored.

@@ -1,16 +1,17 @@
-//! Time that a stop takes on Mars, by stage (R147–R150): a processor of 20 MHz, a transfer of tens of seconds a pair.
+//! Time that a stop takes on Mars, by stage (R147–R150): a 20 MHz processor, tens of seconds per image transfer.
 //!
 //! | stage | time | source |
 //! |---|---|---|
 //! | point_mast | 5 s | ours |
-//! | capture | 30 s for a 12-bit 1024 × 1024 pair, less with fewer pixels, 5 s at least | R148 |
+//! | capture | 30 s for a 12-bit 1024 × 1024 pair, less with fewer pixels, at least 5 s | R148 |
 //! | locate | 25 s: correlation 4 s, point stereo 1 s, 20 s of other tasks of the processor | R147, R149 |
-//! | visual odometry | 90 s for each update, and point_mast and capture for a pair of its own | R149 |
+//! | visual odometry | 90 s for each update, and point_mast and capture for a separate pair | R149 |
 //! | select_path | 300 s with a hazard map: its pair, the map and the path | R149 |
 //! | drive | 3.75 cm/s, 2.1°/s | domain.md 5.4 |
 //!
-//! The time of the other tasks is chosen such that an update takes one minute, as in the first line of Table IV (R143): two updates in two
-//! minutes, without a motion. The other lines of the table, and the 19 min of checkout 2, are not used and test the model.
+//! The time of the other tasks is chosen such that an update takes one minute, as in the first line of Table IV (R143):
+//! two updates in two minutes, without a motion. The other lines of the table, and the 19 min of checkout 2, are test
+//! data.
 //!
 //! Unit: s.
 
@@ -29,7 +30,7 @@ const CAPTURE_PX: f64 = 2.0 * 1024.0 * 1024.0;
 const CAPTURE_MIN_S: f64 = 5.0;
 /// Turning the mast, s.
 const POINT_MAST_S: f64 = 5.0;
-/// Finding the target with the other tasks that run meanwhile, s.
+/// Locating the target, including concurrent tasks, s.
 const LOCATE_S: f64 = 25.0;
 /// One update of the navigator: pair, hazard map and path, s.
 const HAZARDS_S: f64 = 300.0;
@@ -43,14 +44,14 @@ pub const TURN_RAD_S: f64 = 2.1 * std::f64::consts::PI / 180.0;
 /// Time of one stop on Mars by stage, s.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct FlightTime {
-    /// Measuring the motion to the stop by vision; 0 where that is not done.
+    /// Measuring the motion to the stop by visual odometry; 0 without it.
     #[serde(default)]
     pub odometry_s: f64,
     /// Turning the mast.
     pub point_mast_s: f64,
     /// Exposing and transferring the pair.
     pub capture_s: f64,
-    /// Finding the target, with the other tasks of the processor.
+    /// Locating the target, including other tasks of the processor.
     pub locate_s: f64,
     /// Pair, hazard map and path; 0 without a hazard map.
     #[serde(default, skip_serializing_if = "is_zero")]
@@ -81,7 +82,7 @@ pub(super) fn drive_s(motion: &Motion) -> f64 {
 }
 
 impl FlightTime {
-    /// A tracked stop whose images have these sizes, px, without the drive that follows.
+    /// The time of a tracked stop with images of these sizes, px, without the following drive.
     pub fn of_stop(image_sizes: [[u32; 2]; 2], odometry: Option<&MeasuredMotion>) -> Self {
         let capture_s = capture_s(image_sizes);
         let pair_s = POINT_MAST_S + capture_s;
@@ -98,12 +99,12 @@ impl FlightTime {
         }
     }
 
-    /// The same of a stop at which a path is chosen on a hazard map.
+    /// The same for a stop at which a path is chosen on a hazard map.
     pub(crate) const fn with_hazards(self) -> Self {
         Self { hazards_s: HAZARDS_S, ..self }
     }
 
-    /// The same of a stop at which odometry runs alone, in the pair that the tracker would have or in one of its own.
+    /// The same for a stop at which only visual odometry runs, in the tracker's pair or in a separate one.
     pub(crate) fn without_tracking(self, pair: OdometryPair) -> Self {
         let alone = Self { locate_s: 0.0, ..self };
         match pair {
@@ -112,7 +113,8 @@ impl FlightTime {
         }
     }
 
-    /// The time of a stage, s; 0 for those that take next to none. Visual odometry comes before the prediction and counts with it.
+    /// The time of a stage, s; 0 for stages that take almost none. Visual odometry precedes the prediction and counts with
+    /// it.
     pub const fn of(&self, stage: CycleStage) -> f64 {
         match stage {
             CycleStage::Predict => self.odometry_s,
@@ -125,7 +127,7 @@ impl FlightTime {
         }
     }
 
-    /// All stages together, s.
+    /// Total time of all stages, s.
     pub(crate) fn total_s(&self) -> f64 {
         self.odometry_s + self.point_mast_s + self.capture_s + self.locate_s + self.hazards_s + self.drive_s
     }

@@ -1,16 +1,16 @@
-//! Limit cycles: a rover that comes back to one place again and again will not arrive.
+//! Limit cycles: a rover that returns to one place again and again will not arrive.
 //!
-//! A visit is a sequence of consecutive stops near the present pose estimate: within 5 cm, horizontally, and 5°. Motions are
-//! functions of the pose, the map and the goal, which hardly change by then, so that the same decisions follow as before.
+//! A visit is a sequence of consecutive stops near the current pose estimate: within 5 cm, horizontally, and 5°. Motions
+//! are functions of the pose, the map and the goal, which hardly change between visits, so that the decisions repeat.
 //!
 //! Frame: site. Source: Spirit on sol 206 (driving.md 3); the rule is ours.
 
 use sightline_geometry::frames::Pose;
 
-/// A pose nearer than this is at the same place, m and rad.
+/// Largest distance and heading difference of poses at the same place, m and rad.
 const NEAR_M: f64 = 0.05;
 const NEAR_RAD: f64 = 5.0 * std::f64::consts::PI / 180.0;
-/// The drive ends at this visit to one place.
+/// The visit to one place at which the drive ends.
 pub(super) const VISITS_MAX: usize = 4;
 
 /// The first index of each visit to the last of `poses`, which is one of them.
@@ -24,7 +24,7 @@ pub(super) fn visits(poses: &[Pose]) -> Vec<usize> {
     (0..near.len()).filter(|&index| near[index] && (index == 0 || !near[index - 1])).collect()
 }
 
-/// The sentence about the stops at one place.
+/// Describes the stops at one place in a sentence.
 pub(super) fn sentence(stops: &[usize]) -> String {
     let numbers: Vec<String> = stops.iter().map(ToString::to_string).collect();
     let (last, others) = numbers.split_last().map_or(("", &[][..]), |(last, others)| (last.as_str(), others));

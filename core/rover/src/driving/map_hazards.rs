@@ -1,11 +1,11 @@
-//! Stage 8 in the loop, `map_hazards`: the goodness map of each stop, from the images of one or several pairs of every stop since the
-//! designation.
+//! Stage 8 in the loop, `map_hazards`: the goodness map of each stop, from the images of one or several pairs of every
+//! stop since the designation.
 //!
 //! ```text
 //! pairs of stop k ─► range_points ─► map_hazards (map of stop k − 1, pose estimate of stop k) ─► assess ─► goodness map of stop k
 //! ```
-//! The map of a stop is a function of the stops up to it and of the command: a drive that is resumed or branched has the same bits.
-//! [`HazardMaps`] keeps the results, so that a decision that is requested again costs no second stereo.
+//! The map of a stop is a function of the stops up to it and of the command: a resumed or branched drive has the same
+//! bits. [`HazardMaps`] caches the results, so that repeating a decision requires no second stereo.
 //!
 //! Frame: site. Sources: domain.md 8; papers.md R9, R99–R102.
 
@@ -25,12 +25,12 @@ use crate::hazards::{
 use crate::pair::FurtherCamera;
 use crate::pipeline::Stops;
 
-/// The outcome of the pairs of a stop.
+/// The result of the pairs of a stop.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RangeData {
-    /// The number of their points.
+    /// Total number of points.
     Points(usize),
-    /// The reason why one has none.
+    /// Why a pair has none.
     Missing(String),
 }
 
@@ -55,10 +55,10 @@ impl StopHazards {
     }
 }
 
-/// The pairs of the hazard map of a command, at the stop of the designation; none for a navigator without a map.
+/// The pairs for the hazard map of a command, at the stop of the designation; empty for a navigator without a map.
 ///
 /// # Errors
-/// [`Error::Setting`] for a stop without such a pair, or without one that the command names.
+/// [`Error::Setting`] for a stop without such a pair, or without one named in the command.
 pub fn hazard_cameras(stops: &dyn Stops, step: usize, command: &DriveCommand) -> Result<Vec<CameraName>> {
     let cameras = stops.further_cameras(step);
     let is_pair =
@@ -74,7 +74,8 @@ pub fn hazard_cameras(stops: &dyn Stops, step: usize, command: &DriveCommand) ->
     }
 }
 
-/// The first pair on the body that a command names, or else the first one that looks ahead, for the hazard map and the hand-off.
+/// The first pair on the body named in a command, or else the first forward-looking one, for the hazard map and the
+/// hand-off.
 ///
 /// # Errors
 /// [`Error::Setting`] for a stop without such a pair.
@@ -113,23 +114,23 @@ fn choices(cameras: &[FurtherCamera<'_>]) -> String {
     format!("choose {}", names.join(" or "))
 }
 
-/// Range data of a stop in the map.
+/// A stop that is part of the map.
 #[derive(Clone, Debug)]
 struct Mapped {
     site_from_rover: Pose,
     range: RangeData,
-    /// The last goodness map that was requested, and its rules.
+    /// The last requested goodness map, with its rules.
     assessed: Option<(MapRules, Arc<StopHazards>)>,
 }
 
-/// The points of a pair, rover frame, m, with their error.
+/// The points of a pair, rover frame, m, with their error model.
 #[derive(Default)]
 struct PairPoints {
     points: Vec<Point3>,
     noise: Option<RangeNoise>,
 }
 
-/// The hazard maps of a drive, computed stop by stop and kept.
+/// The hazard maps of a drive, computed stop by stop and cached.
 #[derive(Clone, Debug, Default)]
 pub struct HazardMaps {
     settings: HazardSettings,
@@ -137,13 +138,13 @@ pub struct HazardMaps {
     source: Option<(Vec<CameraName>, usize)>,
     /// By stop since the first.
     stops: Vec<Mapped>,
-    /// The map of the last of them, with the distance driven, m.
+    /// The map of the last of these stops, and the distance driven, m.
     map: Option<HazardMap>,
     driven_m: f64,
 }
 
 impl HazardMaps {
-    /// The hazards of the stop of a step of a drive since the designation; `None` for a navigator without a map.
+    /// The hazards at the stop of a step of a drive since the designation; `None` for a navigator without a map.
     ///
     /// # Errors
     /// [`Error::Cancelled`], and images that cannot be read or written.
@@ -154,7 +155,7 @@ impl HazardMaps {
         [first, last]: [&StepTrace; 2],
         cancel: Cancel<'_>,
     ) -> Result<Option<Arc<StopHazards>>> {
-        // Refused at the begin of the drive; a command that was changed on the way has no range data.
+        // Rejected at the start of the drive; a command changed on the way has no range data.
         let cameras = hazard_cameras(stops, first.step, command).unwrap_or_default();
         if cameras.is_empty() {
             return Ok(None);
@@ -174,7 +175,7 @@ impl HazardMaps {
             return Ok(Some(Arc::clone(hazards)));
         }
         if self.stops.len() > index + 1 {
-            // The map itself is kept for the last stop alone.
+            // Only the last stop's map is stored.
             self.clear();
             self.source = source;
         }
@@ -245,7 +246,7 @@ impl HazardMaps {
     /// The points of a pair at a stop, or why there are none.
     ///
     /// # Errors
-    /// [`Error::Cancelled`], and images that cannot be read or written: they may come at the next attempt.
+    /// [`Error::Cancelled`], and images that cannot be read or written: a retry may succeed.
     fn points(
         &self,
         stops: &dyn Stops,

@@ -3,7 +3,7 @@
 //! ```text
 //! last step ─► set_goal ─► map_hazards ─► select_path ─► drive ─► point_mast ─► odometry ─► run_step ─► next step
 //! ```
-//! [`executive`] is the loop; it asks an [`ActiveWorld`] to move the rover and sees estimates alone.
+//! [`executive`] is the loop; it requests motions from an [`ActiveWorld`] and receives estimates only.
 
 pub mod active_world;
 pub mod command;

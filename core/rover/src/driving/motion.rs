@@ -9,8 +9,8 @@
 //! | s, κ | part of `length_m`, `curvature_per_m` (positive to the right) | m, 1/m |
 //! | x, y, ψ | position ahead and to the right of the start, heading | m, rad |
 //!
-//! As text, of a list of motions: `0.5` (m, straight; negative: back), `turn 20` (deg, positive to the right), `0.5 turn 20` (an arc of
-//! 0.5 m that turns by 20°).
+//! Text form in a list of motions: `0.5` (m, straight; negative: back), `turn 20` (deg, positive to the right),
+//! `0.5 turn 20` (an arc of 0.5 m that turns by 20°).
 //!
 //! Frame: rover at the start of the motion, horizontal.
 
@@ -33,7 +33,7 @@ pub enum Motion {
         /// Curvature, 1/m; positive to the right, 0 straight ahead.
         curvature_per_m: f64,
     },
-    /// On the spot.
+    /// A turn on the spot.
     Turn {
         /// Angle, rad, positive to the right.
         angle_rad: f64,
@@ -41,7 +41,7 @@ pub enum Motion {
 }
 
 impl Motion {
-    /// Curvature, 1/m, positive to the right; 0 of a turn in place.
+    /// Curvature, 1/m, positive to the right; 0 for a turn in place.
     pub(crate) fn curvature_per_m(&self) -> f64 {
         match *self {
             Self::Arc { curvature_per_m, .. } => curvature_per_m,
@@ -49,7 +49,7 @@ impl Motion {
         }
     }
 
-    /// Length of the path, m, and turn, rad, positive to the right.
+    /// Length of the path, m, and rotation, rad, positive to the right.
     pub fn length_and_turn(&self) -> (f64, f64) {
         match *self {
             Self::Arc { length_m, curvature_per_m } => (length_m, length_m * curvature_per_m),
@@ -57,7 +57,7 @@ impl Motion {
         }
     }
 
-    /// The first part of the motion, 0 to 1.
+    /// The first part of the motion; `part` is 0 to 1.
     pub(super) fn part(&self, part: f64) -> Self {
         match *self {
             Self::Arc { length_m, curvature_per_m } => {
@@ -67,14 +67,14 @@ impl Motion {
         }
     }
 
-    /// Where the rover is after a part of the motion, 0 to 1, on level ground without slip: ahead and to the right of its
-    /// start, m, and turned to the right, rad.
+    /// Pose after a fraction of the motion, 0 to 1, on level ground without slip: position ahead and to the right of its
+    /// start, m, and rotation to the right, rad.
     pub fn after(&self, part: f64) -> ([f64; 2], f64) {
         match *self {
             Self::Turn { angle_rad } => ([0.0; 2], part * angle_rad),
             Self::Arc { length_m, curvature_per_m } => {
                 let (length_m, turn_rad) = (part * length_m, part * length_m * curvature_per_m);
-                // Of a circle so wide the difference from a straight line is below rounding.
+                // For so large a radius the difference from a straight line is below rounding.
                 if turn_rad.abs() < 1e-9 {
                     return ([length_m, 0.0], turn_rad);
                 }
@@ -111,7 +111,7 @@ impl FromStr for Motion {
 
 impl fmt::Display for Motion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // Three decimals, without those that are 0.
+        // Three decimals, without trailing zeros.
         let short = |value: f64| (value * 1e3).round() / 1e3 + 0.0;
         match *self {
             Self::Turn { angle_rad } => write!(f, "turn {}", short(angle_rad.to_degrees())),

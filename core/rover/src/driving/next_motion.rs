@@ -1,7 +1,7 @@
-//! The motion of a cycle: asks the navigator for a path and cuts it to what visual odometry follows.
+//! The motion of a cycle: requests a path from the navigator and limits it to the range of visual odometry.
 //!
-//! With a navigator on a hazard map the drive ends here without range data and where every path is vetoed; the rover then stays. An
-//! approach after arrival takes arcs, and ends where the map has an obstacle under the rover on its way.
+//! With a navigator on a hazard map the drive ends here without range data and if every path is vetoed; the rover then
+//! stays. An approach after arrival uses arcs, and ends if the map has an obstacle under the rover's path.
 
 use super::command::{DriveCommand, TrackedStops};
 use super::ending::{Ending, StopReason};
@@ -16,12 +16,12 @@ use crate::pipeline::Stops;
 use crate::sight::has_stayed;
 use crate::visual_odometry::OdometryMode;
 
-/// Longest step and largest turn that odometry follows, m and rad (driving.md 1: 75 cm, 18°).
+/// Longest step and largest turn that visual odometry can measure, m and rad (driving.md 1: 75 cm, 18°).
 const STEP_MAX_M: f64 = 0.75;
 const TURN_MAX_RAD: f64 = 18.0 * std::f64::consts::PI / 180.0;
 /// Largest slip, of either sign, that the next step compensates.
 const SLIP_MADE_GOOD: f64 = 0.5;
-/// Shortest part of a step, where the slip left less of it, m.
+/// Shortest remainder of a step, m, used if slip left less than that.
 const PART_MIN_M: f64 = 0.1;
 
 /// Chooses the motion of a cycle whose target is `distance_m` from the left camera, or ends the drive.
@@ -53,7 +53,7 @@ pub(super) fn choose(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &mut Cycl
     let choice = navigator.select_path(&path_input);
     match choice.motion() {
         Some(motion) => {
-            // On a map the rover drives no farther than the path was judged.
+            // On a map the rover drives no farther than the path was evaluated.
             let moved = (1..=cycle.step).rev().find(|step| !has_stayed(stops, *step));
             let slip = moved.and_then(|step| slip_to(stops, step)).filter(|_| map.is_none());
             let (motion, is_part) = followable(motion, input.command, slip);
@@ -76,7 +76,7 @@ pub(super) fn choose(stops: &dyn Stops, input: &CycleInput<'_>, cycle: &mut Cycl
     cycle.choice = Some(choice).filter(|_| map.is_some());
 }
 
-/// The end of an approach whose way has an obstacle.
+/// The end of an approach with an obstacle on its path.
 fn unclear(obstacle: &Obstacle) -> Ending {
     let [x_m, y_m] = obstacle.in_site_m;
     let (height_m, limit_m) = (obstacle.height_m, obstacle.limit_m);
@@ -108,7 +108,7 @@ fn range<'a>(input: &CycleInput<'a>) -> Result<Option<&'a GoodnessMap>, Ending> 
     }
 }
 
-/// Largest length of the next motion, m. After a stop for odometry alone, this is the rest of the step.
+/// Largest length of the next motion, m; after a stop for odometry alone, the rest of the step.
 fn step_m(input: &CycleInput<'_>, distance_m: f64) -> f64 {
     let step_m = input.command.step_fraction * distance_m;
     if !input.last.is_odometry_alone() {
@@ -117,8 +117,8 @@ fn step_m(input: &CycleInput<'_>, distance_m: f64) -> f64 {
     (step_m - input.last.update.target.travelled_since_update_m).max(PART_MIN_M)
 }
 
-/// A motion that odometry can follow: at most 75 cm and 18°, and longer by the slip of the step before (driving.md 1). True where
-/// it is a part of the wanted one.
+/// Limits a motion to what odometry can measure, at most 75 cm and 18°, then lengthens it by the slip of the previous step
+/// (driving.md 1). Returns whether it is only a part of the given one.
 fn followable(motion: Motion, command: &DriveCommand, slip: Option<f64>) -> (Motion, bool) {
     if command.odometry == OdometryMode::Off {
         return (motion, false);
@@ -134,7 +134,7 @@ fn followable(motion: Motion, command: &DriveCommand, slip: Option<f64>) -> (Mot
             let is_part = length_m.abs() > max_m;
             let followed_m = match command.tracked_stops {
                 TrackedStops::Every => length_m.clamp(-max_m, max_m),
-                // The parts of a step have the same length.
+                // The parts of a step have equal lengths.
                 TrackedStops::ByDistance => length_m / (length_m.abs() / max_m).ceil().max(1.0),
             };
             (Motion::Arc { length_m: followed_m / (1.0 - lost), curvature_per_m }, is_part)
@@ -142,7 +142,7 @@ fn followable(motion: Motion, command: &DriveCommand, slip: Option<f64>) -> (Mot
     }
 }
 
-/// The slip along the motion to a stop, where it was measured.
+/// The slip ratio along the motion to a stop; `None` if it was not measured.
 pub(super) fn slip_to(stops: &dyn Stops, step: usize) -> Option<f64> {
     let update = &stops.measured_motion(step)?.update;
     Some(update.slip.filter(|_| update.accepted)?.along)

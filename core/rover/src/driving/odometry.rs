@@ -1,9 +1,9 @@
-//! Stage 0, `odometry`: measures the motion to a stop by vision and corrects the pose estimate there by it (R11, R94).
+//! Stage 0, `odometry`: measures the motion to a stop by visual odometry and corrects the pose estimate there (R11, R94).
 //!
-//! The pair in which the tracker looks for its target serves both, or vision takes a pair of its own at every stop
-//! ([`OdometryPair`]), for which the mast keeps the ground before in view; the tracker's mast then follows the corrected pose.
+//! The tracker's pair serves both, or visual odometry takes a separate pair at every stop ([`OdometryPair`]), for which
+//! the mast keeps the ground of the previous pair in view; the tracker's mast then follows the corrected pose.
 //!
-//! Where an update is refused, the mast looks back at the rover's own tracks (R142), for the next motion: where that is refused
+//! If an update is refused, the mast looks back at the rover's own tracks (R142) for the next motion: if that is refused
 //! in the main pair, too, it is measured in the pairs that look back. Sources: domain.md 9.2; R94, R142.
 
 use serde::{Deserialize, Serialize};
@@ -21,19 +21,19 @@ use crate::sight::has_stayed;
 use crate::visual_odometry::look::{is_back, look, look_back};
 use crate::visual_odometry::{MeasuredMotion, OdometryMode};
 
-/// The pairs in which vision measures the motion.
+/// The pairs in which visual odometry measures the motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum OdometryPair {
-    /// Those of the tracker; where an update is refused, also pairs that look back.
+    /// Those of the tracker; after a refused update, also pairs that look back.
     #[default]
     Shared,
     /// Pairs of its own at every stop, ahead, and back once an update is refused.
     Own,
 }
 
-/// Measures the motion to the last stop, whose number is `step`, and corrects the estimated pose there. Does nothing without
-/// odometry, where the rover stayed, and where the motion is measured already.
+/// Measures the motion to the last stop, of index `step`, and corrects the estimated pose there. Does nothing without
+/// odometry, if the rover stayed, or if the motion is already measured.
 ///
 /// # Errors
 /// Images that cannot be read, a stop that cannot be stored, or [`sightline_geometry::error::Error::Cancelled`].
@@ -44,7 +44,7 @@ pub fn run(
     cancel: Cancel<'_>,
 ) -> Result<()> {
     let stops = world.stops();
-    // Without images the pose stays that of wheels, gyro and accelerometers.
+    // Without images the pose remains that of wheels, gyro and accelerometers.
     let is_blind = [step - 1, step].into_iter().any(|step| stops.has_dropped_out(step));
     if command.odometry == OdometryMode::Off
         || has_stayed(stops, step)
@@ -63,7 +63,7 @@ pub fn run(
     world.correct(measured)
 }
 
-/// Takes the pair of its own at a stop that the rover is about to leave, if vision is to have one there and has none.
+/// Takes the separate pair at a stop that the rover is about to leave, if odometry needs one there and has none.
 ///
 /// # Errors
 /// A stop that cannot be stored.
@@ -88,8 +88,8 @@ fn measure(
     MeasuredMotion::measure(world.stops(), step, camera, how, cancel)
 }
 
-/// The second try after the main pair was refused: in the pairs that look back, if there is one at the stop before. Where there
-/// is none, or that is refused as well, the mast looks back for the next motion.
+/// The second attempt after the main pair was refused: in the pairs that look back, if the previous stop has one. If it
+/// has none, or that is refused as well, the mast looks back for the next motion.
 fn again(
     world: &mut dyn ActiveWorld,
     command: &DriveCommand,
@@ -109,7 +109,7 @@ fn again(
     })
 }
 
-/// The motion by the pairs that vision takes of its own. Once it is refused ahead, the mast looks back.
+/// Measures the motion in the separate pairs. After a refusal ahead, the mast looks back.
 fn in_own_pair(
     world: &mut dyn ActiveWorld,
     command: &DriveCommand,
@@ -127,7 +127,7 @@ fn in_own_pair(
     Ok(measured)
 }
 
-/// Points the mast for a pair that sees the ground of that of the stop before again; false where there is none.
+/// Points the mast for a pair that covers the ground of the previous stop's pair; false if that stop has none.
 fn look_at_the_ground_before(world: &mut dyn ActiveWorld, step: usize) -> Result<bool> {
     let stops = world.stops();
     let predicted = stops.site_from_rover(step).inverse() * stops.site_from_rover(step - 1);
@@ -153,7 +153,7 @@ pub(super) fn has_looked_back(stops: &dyn Stops, step: usize) -> bool {
     own_pair(stops, step).is_some_and(is_back)
 }
 
-/// Where the mast looked for the pair that vision took of its own at a stop.
+/// Mast angles of visual odometry's separate pair at a stop; `None` without one.
 fn own_pair(stops: &dyn Stops, step: usize) -> Option<MastAngles> {
     let cameras = stops.further_cameras(step);
     cameras.iter().find(|camera| camera.name == CameraName::ODOMETRY)?.mast_angles

@@ -1,7 +1,8 @@
 //! Stage 9, `select_path`: the next motion towards the goal.
 //!
-//! [`ArcNavigator`] knows no obstacles: the circle that is tangent to the heading and passes through the goal, driven as far as
-//! a step may go, or a turn in place where the circle is too tight. Navigators with a hazard map implement the same trait.
+//! [`ArcNavigator`] ignores obstacles: it drives along the circle that is tangent to the heading and passes through the
+//! goal, by at most one step, or turns in place if the circle is too tight. Navigators with a hazard map implement the
+//! same trait.
 //!
 //! ```text
 //! β = atan2(y, x)      κ = 2 sin β / d      length to the goal = d β / sin β
@@ -22,14 +23,14 @@ use super::path_choice::{Candidate, PathChoice};
 use crate::hazards::goodness::GoodnessMap;
 use crate::navigation::counterfactual::LimitChange;
 
-/// What a navigator decides from.
+/// Inputs of a navigator.
 #[derive(Clone, Copy, Debug)]
 pub struct PathInput<'a> {
-    /// The goal ahead and to the right of the rover, m; it is not reached yet.
+    /// The goal ahead and to the right of the rover, m; not reached yet.
     pub goal_m: [f64; 2],
     /// Largest length of the motion, m.
     pub step_m: f64,
-    /// The motion that led here; `None` at the first stop and where the rover stayed.
+    /// The motion that led here; `None` at the first stop and if the rover stayed.
     pub before: Option<Motion>,
     /// The goodness map of this stop; `None` without range data.
     pub map: Option<&'a GoodnessMap>,
@@ -39,11 +40,11 @@ pub struct PathInput<'a> {
 
 /// Chooses the next motion.
 pub trait Navigator {
-    /// The motion towards the goal, with every path that was considered; no motion if no path is safe.
+    /// The motion towards the goal, with every considered path; no motion if no path is safe.
     fn select_path(&self, input: &PathInput<'_>) -> PathChoice;
 
-    /// The smallest raised limit that opens a vetoed path of a choice; `None` if no single one does, and for a navigator without
-    /// limits.
+    /// The smallest raised limit that opens a vetoed path of a choice; `None` if no single one does, and for a navigator
+    /// without limits.
     fn smallest_change(&self, _input: &PathInput<'_>, _choice: &PathChoice) -> Option<LimitChange> {
         None
     }
@@ -52,9 +53,9 @@ pub trait Navigator {
 /// A navigator without a hazard map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArcNavigator {
-    /// Tightest circle, 1/m.
+    /// Curvature of the tightest circle, 1/m.
     pub curvature_max_per_m: f64,
-    /// A goal behind is reached backwards up to this distance, m; farther away the rover turns.
+    /// A goal behind is approached backwards up to this distance, m; beyond it the rover turns.
     pub reverse_max_m: f64,
 }
 

@@ -3,7 +3,8 @@
 //! ```text
 //! goal = target + standoff · (start − target)/|start − target| + offset      horizontally, site frame
 //! ```
-//! `start` is the rover at the time of the command, and `standoff` the final one once an approach after arrival has begun.
+//! `start` is the rover's position at the time of the command, and `standoff` is the final one after an approach has
+//! begun.
 //!
 //! Frame: site, m. Source: papers.md R6, R7.
 
@@ -14,13 +15,13 @@ use sightline_geometry::frames::{Point3, Pose};
 
 use super::command::DriveCommand;
 
-/// Where the rover is to stop.
+/// The position at which the rover is to stop.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[schema(as = DriveGoal)]
 pub struct Goal {
     /// The goal, x and y of the site frame, m.
     pub in_site_m: [f64; 2],
-    /// The same from the rover's origin, ahead and to the right, m.
+    /// The same relative to the rover's origin, ahead and to the right, m.
     pub in_rover_m: [f64; 2],
     /// Horizontal distance of the rover's origin from it, m.
     pub distance_m: f64,
@@ -28,8 +29,8 @@ pub struct Goal {
     pub arrived: bool,
 }
 
-/// Horizontal goal position for a target, x and y of the site frame, m; `start_m` is the rover at the time of the command, `actions`
-/// the number of actions after arrival that were begun.
+/// Horizontal goal position for a target, x and y of the site frame, m; `start_m` is the rover's position at the time of
+/// the command, `actions` the number of begun actions after arrival.
 pub fn goal_position_m(
     command: &DriveCommand,
     actions: u32,
@@ -45,7 +46,7 @@ pub fn goal_position_m(
     ]
 }
 
-/// The goal as seen from a rover.
+/// The goal relative to the rover.
 pub fn set_goal(
     command: &DriveCommand,
     actions: u32,

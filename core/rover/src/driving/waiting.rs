@@ -1,18 +1,18 @@
-//! Targets that wait while the rover drives to another one (R207): when the mast looks at one of them, so that its tracker sees it
-//! change little by little.
+//! Waiting targets: those to which the rover drives after the current one (R207). Decides when the mast looks at one of
+//! them, so that its appearance changes little between its tracker's updates.
 //!
 //! ```text
 //! due    if |p − p_seen| > step_fraction · |t − p|
 //! ```
 //! | symbol | meaning |
 //! |---|---|
-//! | p | place of the rover, site frame, m |
-//! | p_seen | its place at the last stop at which the pair was pointed at the target, or showed it |
-//! | t | the target as it was designated, site frame, m |
+//! | p | position of the rover, site frame, m |
+//! | p_seen | its position at the last stop where the pair was pointed at the target, or showed it |
+//! | t | the target as designated, site frame, m |
 //!
-//! The motions to the present target have the same limit. The mast is pointed at the place of the designation; the tracker uses its own
-//! prediction. A look is a stop of its own, and so is the look back at the present target. Both are left out of the count that `stops_max`
-//! limits.
+//! The motions to the current target have the same limit. The mast is pointed at the designated position; the tracker uses
+//! its own prediction. A look is a separate stop, and so is the look back at the current target. `stops_max` counts
+//! neither.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -38,14 +38,14 @@ pub struct WaitingTarget {
 }
 
 impl WaitingTarget {
-    /// Its place in the rover frame, m.
+    /// Position in the rover frame, m.
     pub(super) fn in_rover(&self, site_from_rover: &Pose) -> Point3 {
         site_from_rover.inverse_transform_point(&self.in_site_m.into())
     }
 
-    /// Whether the pair was pointed at it at a stop, or showed it.
+    /// Whether the pair was pointed at the target at a stop, or showed it.
     fn is_seen(&self, stops: &dyn Stops, step: usize) -> bool {
-        // A look at which the cameras gave no images is not repeated before the rover has moved on.
+        // A look without images is not repeated before the rover has moved.
         if stops.mast_target(step) == Some(self.designation) {
             return true;
         }
@@ -54,13 +54,13 @@ impl WaitingTarget {
         pair.is_some_and(|pair| is_in_view(&pair, &self.in_rover(&stops.site_from_rover(step))))
     }
 
-    /// The pair of a stop in which it is tracked, if that is on the mast.
+    /// The pair in which the target is tracked at a stop, if it is on the mast.
     fn mast_pair<'a>(&self, stops: &'a dyn Stops, step: usize) -> Option<StopPair<'a>> {
         let pair = pair::of_stop(stops, step, self.designation.camera).ok()?;
         Some(pair).filter(|pair| pair.mast_angles.is_some())
     }
 
-    /// Whether the rover has moved so far since it was last seen that it is to be looked at, at a stop.
+    /// Whether the rover has moved far enough since the target was last seen for a look at it.
     fn is_due(&self, stops: &dyn Stops, step: usize, step_fraction: f64) -> bool {
         if self.mast_pair(stops, step).is_none() {
             return false;
@@ -73,8 +73,8 @@ impl WaitingTarget {
     }
 }
 
-/// The waiting target that the mast looks at next from a stop; `None` if none is due, without a mast, and where the mast looked back
-/// at the tracks because odometry was refused.
+/// The waiting target at which the mast looks next from a stop; `None` if none is due, without a mast, and if the mast
+/// looked back at the tracks because odometry was refused.
 pub(super) fn due<'a>(
     stops: &dyn Stops,
     command: &'a DriveCommand,
@@ -84,7 +84,7 @@ pub(super) fn due<'a>(
     command.waiting.iter().find(|target| target.is_due(stops, step, command.step_fraction))
 }
 
-/// The waiting target at which the mast is to be pointed at a stop, because it was due at the one before.
+/// The waiting target at which the mast is pointed at a stop, if any.
 pub(super) fn looked_at<'a>(
     stops: &dyn Stops,
     command: &'a DriveCommand,
@@ -94,7 +94,7 @@ pub(super) fn looked_at<'a>(
     command.waiting.iter().find(|target| target.designation == designation)
 }
 
-/// Number of stops since the designation, looks at another target and looks back left out.
+/// Number of stops since the designation, excluding looks at another target and looks back.
 pub(super) fn stops_beside_looks(stops: &dyn Stops, first: &StepTrace, last: usize) -> usize {
     let designation = first.update.target.designation;
     let is_look = |step: &usize| has_stayed(stops, *step) && !is_another_look(stops, *step, designation);

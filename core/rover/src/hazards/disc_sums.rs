@@ -5,7 +5,7 @@
 //! ```
 //! | symbol | meaning |
 //! |---|---|
-//! | m | sums of a cell, about the middle of the window |
+//! | m | sums of a cell, relative to the centre of the window |
 //! | d, w_d | row of the disc and its half-width |
 //!
 //! The work for a cell grows with the radius instead of its square. Prefix sums: [Crow84], here along rows alone.
@@ -16,14 +16,14 @@ use super::grid::Disc;
 use super::map::HazardMap;
 use super::moments::{Moments, SUMS};
 
-/// The sums of a cell, and 1 if it is known.
+/// Number of sums of a cell and of its flag, which is 1 if it is known.
 const WITH_KNOWN: usize = SUMS + 1;
 type Sums = [f64; WITH_KNOWN];
 
-/// The points in the disc around a cell.
+/// Statistics of the disc around a cell.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DiscSums {
-    /// Their sums, about the middle of the window.
+    /// Sums over its points, relative to the centre of the window.
     pub(super) moments: Moments,
     /// Number of known cells.
     pub(super) known: f64,
@@ -39,7 +39,7 @@ pub(super) fn disc_sums(map: &HazardMap, disc: &Disc, weight_min: f64) -> Vec<Di
     rows.concat()
 }
 
-/// Sums over the cells of a row before each column.
+/// Prefix sums over the cells of a row: entry j contains the columns before j.
 fn row_prefixes(map: &HazardMap, row: usize, weight_min: f64) -> Vec<Sums> {
     let (side, cell_m) = (map.grid.side, map.grid.cell_m);
     let from_middle = |number: usize| (number as f64 + 0.5 - 0.5 * side as f64) * cell_m;

@@ -11,9 +11,9 @@
 //! | n | decayed number of points in the disc of the rover's radius | – |
 //! | s, s_seen | distance driven, and that at the observation of a point | m |
 //!
-//! A cell of less certainty than `certainty_min` is unknown, and so is one whose points are on a line. Cells within
-//! `exemption_radius_m` of the target are exempt (R100). Unknown cells near the start of the drive are assumed to be good until
-//! the rover is `start_distance_m` from it (R102).
+//! A cell is unknown if its certainty is below `certainty_min` or its points are on a line. Cells within
+//! `exemption_radius_m` of the target are exempt (R100). Unknown cells near the start of the drive are assumed to be good
+//! until the rover is `start_distance_m` from it (R102).
 //!
 //! Frame: site. Source: domain.md 8.2.
 
@@ -35,24 +35,24 @@ pub enum HazardTerm {
     Tilt,
     /// RMS residual of the plane, m.
     Roughness,
-    /// Largest difference of the heights of two cells above the slope of the ground, m.
+    /// Largest height difference of two nearby cells relative to the slope of the ground, m.
     Step,
-    /// Certainty below its limit; of a path the share of unknown cells.
+    /// Certainty below its limit; for a path, the fraction of unknown cells.
     Unknown,
 }
 
-/// Where the goodness of a cell comes from.
+/// Source of a cell's goodness.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CellBasis {
     /// Range data.
     Measured,
-    /// Too few data: it has no goodness.
+    /// Too few data: no goodness.
     #[default]
     Unknown,
-    /// Too few data, but near the start: counted as good.
+    /// Too few data, but near the start: counts as good.
     Assumed,
-    /// Near the target: counted as good whatever the data are.
+    /// Near the target: counts as good regardless of the data.
     Exempt,
 }
 
@@ -71,12 +71,13 @@ pub struct GoodnessCell {
     pub age_m: f32,
     /// Mean height of the cell's own points, z of the site frame, m; `None` with too few.
     pub height_m: Option<f32>,
-    /// Height of the upper edge of the cell: that of a face where its points are on one, otherwise the mean; z of the site frame, m.
+    /// Height of the cell's upper edge, z of the site frame, m: that of a face if its points are on one, otherwise the
+    /// mean.
     #[serde(default)]
     pub top_m: Option<f32>,
     /// 0 (bad) to 1; 0 if unknown.
     pub goodness: f32,
-    /// Where the goodness comes from.
+    /// Source of the goodness.
     pub basis: CellBasis,
 }
 
@@ -85,7 +86,7 @@ pub struct GoodnessCell {
 pub struct GoodnessMap {
     /// The window of cells.
     pub grid: Grid,
-    /// Its cells, row by row.
+    /// The cells, row by row.
     pub cells: Vec<GoodnessCell>,
     /// The settings of the assessment.
     pub settings: HazardSettings,
@@ -94,13 +95,13 @@ pub struct GoodnessMap {
 /// A circle, site frame, m.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Circle {
-    /// Its centre.
+    /// Centre.
     pub centre_m: [f64; 2],
-    /// Its radius.
+    /// Radius.
     pub radius_m: f64,
 }
 
-/// Circles in which cells count as good in spite of the data.
+/// Circles in which cells count as good regardless of the data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MapRules {
     /// All cells near the target (R100).
@@ -110,7 +111,8 @@ pub struct MapRules {
 }
 
 impl MapRules {
-    /// The rules at a stop: `target_m` and `start_m` are positions in the site frame, m; the first is `None` without a target.
+    /// The rules at a stop: `target_m` and `start_m` are positions in the site frame, m; the former is `None` without a
+    /// target.
     pub fn at(
         rover_m: [f64; 2],
         start_m: [f64; 2],
@@ -135,7 +137,7 @@ impl Circle {
 }
 
 impl HazardTerm {
-    /// Its word in a sentence.
+    /// Name in a sentence.
     pub const fn word(self) -> &'static str {
         match self {
             Self::Tilt => "tilt",
@@ -145,7 +147,7 @@ impl HazardTerm {
         }
     }
 
-    /// A value of it with its unit.
+    /// Formats a value of the term with its unit.
     pub fn text(self, value: f64) -> String {
         match self {
             Self::Tilt => format!("{value:.1}°"),
@@ -154,7 +156,7 @@ impl HazardTerm {
         }
     }
 
-    /// The goodness of a value of this term, 0 to 1; of the certainty 1 from its limit on.
+    /// Goodness of a value of this term, 0 to 1; for the certainty, 1 from its limit on.
     fn goodness(self, value: f64, settings: &HazardSettings) -> f64 {
         let [ok, bad] = match self {
             Self::Tilt => [settings.tilt_ok_deg, settings.tilt_bad_deg],
@@ -167,7 +169,7 @@ impl HazardTerm {
 }
 
 impl GoodnessCell {
-    /// The value of a term: deg, m, m, and the certainty.
+    /// Value of a term: deg, m, m, or the certainty.
     pub fn value(&self, term: HazardTerm) -> f64 {
         f64::from(match term {
             HazardTerm::Tilt => self.tilt_deg,

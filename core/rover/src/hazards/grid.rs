@@ -1,8 +1,8 @@
 //! The window of square cells around the rover, aligned with the site.
 //!
-//! A cell has a number along x and one along y of the site, `⌊x/cell⌋` and `⌊y/cell⌋`. The window contains `side` × `side`
-//! of them. Its content is stored at these numbers modulo `side`, so that a window that moves keeps its common cells in
-//! place (wrap-around). Positions within the window are counted row by row: x is the row, y the column.
+//! A cell has the numbers `⌊x/cell⌋` and `⌊y/cell⌋` along x and y of the site. The window contains `side` × `side` cells.
+//! Their content is stored at these numbers modulo `side`, so that a window that moves keeps its common cells in place
+//! (wrap-around). Positions within the window are counted row by row: x is the row, y the column.
 //!
 //! Frame: site, m.
 
@@ -20,7 +20,7 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// The window with this position in its middle.
+    /// The window centred on a position.
     pub(super) fn around(position_m: [f64; 2], cell_m: f64, side: usize) -> Self {
         let first = position_m.map(|along| (along / cell_m).floor() as i64 - (side / 2) as i64);
         Self { cell_m, side, first }
@@ -52,14 +52,14 @@ impl Grid {
         [0, 1].map(|axis| ((self.first[axis] + cell[axis] as i64) as f64 + 0.5) * self.cell_m)
     }
 
-    /// Where the content of a cell is stored, in every window of as many cells.
+    /// Storage index of a cell, the same in every window of the same size.
     pub(super) fn slot(&self, row: usize, column: usize) -> usize {
         let side = self.side as i64;
         let at = |axis: usize, number: usize| (self.first[axis] + number as i64).rem_euclid(side) as usize;
         at(0, row) * self.side + at(1, column)
     }
 
-    /// Whether the cell in a row and column is in another window of the same cells as well.
+    /// Whether the cell in a row and column is also in another window of the same cells.
     pub(super) fn is_in(&self, row: usize, column: usize, other: &Self) -> bool {
         let side = self.side as i64;
         [(0, row), (1, column)].into_iter().all(|(axis, number)| {
@@ -77,16 +77,16 @@ pub(super) struct Disc {
 }
 
 impl Disc {
-    /// The cells whose centres are at most `radius` cells from that of the middle one.
+    /// The cells whose centres are at most `radius` cells from the centre of the middle one.
     pub(super) fn new(radius: f64) -> Self {
-        // A radius of whole cells includes the last cell in spite of rounding.
+        // An integer radius includes the last cell in spite of rounding.
         let radius = radius + 1e-9;
         let rows = radius as isize;
         let half_width = |row: isize| (radius * radius - (row * row) as f64).max(0.0).sqrt() as isize;
         Self { half_widths: (-rows..=rows).map(half_width).collect() }
     }
 
-    /// r, the rows on either side of the middle one.
+    /// r, the number of rows on either side of the middle one.
     pub(super) fn rows(&self) -> isize {
         (self.half_widths.len() / 2) as isize
     }
@@ -102,7 +102,7 @@ impl Disc {
     }
 }
 
-/// ⌊x⌋, without the call that `f64::floor` is on processors without SSE 4.1.
+/// ⌊x⌋, without the library call that `f64::floor` is on processors without SSE 4.1.
 fn floor(x: f64) -> i64 {
     let towards_zero = x as i64;
     towards_zero.saturating_sub(i64::from(x < towards_zero as f64))

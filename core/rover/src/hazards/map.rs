@@ -1,10 +1,10 @@
-//! The memory of the hazard map: sums over the points of each cell, kept while the cell is in the window.
+//! The state of the hazard map: sums over the points of each cell, kept while the cell is in the window.
 //!
 //! ```text
 //! w ← w · ½^(Δs/h)      for every sum of every cell, s: distance driven, h: half-life
 //! ```
 //! Points enter at the pose estimate of their stop. Sums are relative to the centre of the cell and to the height of the
-//! rover at the first stop: a map that has moved has the same bits as one that was built in its place.
+//! rover at the first stop: a map that has moved has the same bits as one built in place.
 //!
 //! Frame: site, m. Source: domain.md 8.1 (wrap-around grid), 8.2.
 
@@ -17,9 +17,9 @@ use super::grid::Grid;
 use super::moments::{Moments, SUMS};
 use super::settings::HazardSettings;
 
-/// By so many 1σ of its points' heights a face must spread more than `face_spread_m`.
+/// The heights of a face's points must spread by more than `face_spread_m` plus this many 1σ.
 const FACE_SIGMAS: f64 = 2.0;
-/// Sums below this number of points are forgotten.
+/// Cells with fewer points (decayed) are cleared.
 const FORGOTTEN: f64 = 1e-3;
 
 /// Range data of one stop.
@@ -31,11 +31,11 @@ pub struct Scan<'a> {
     pub site_from_rover: &'a Pose,
     /// Distance driven since the first stop, m.
     pub driven_m: f64,
-    /// The error of the points; `None`: they are exact.
+    /// Error model of the points; `None` if they are exact.
     pub noise: Option<RangeNoise>,
 }
 
-/// The error of a stereo pair's range, and so of the height of a point.
+/// Error of a stereo pair's range, and the resulting error of a point's height.
 ///
 /// ```text
 /// σ_range = R² σ_d / (f B)      σ_height = σ_range |h| / R
@@ -56,23 +56,23 @@ impl RangeNoise {
     }
 }
 
-/// Hazard map of a drive: everything that the next stop needs of the stops before.
+/// Hazard map of a drive: the complete state carried from stop to stop.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(into = "Stored", try_from = "Stored")]
 pub struct HazardMap {
     pub(super) grid: Grid,
-    /// Height of the reference of the sums, z of the site frame, m.
+    /// Reference height of the sums, z of the site frame, m.
     pub(super) height_m: f64,
     /// Distance driven, m.
     pub(super) driven_m: f64,
-    /// By slot.
+    /// By storage index.
     cells: Vec<Moments>,
-    /// z of the highest point of each cell, by slot, from the reference, m; infinite without one.
+    /// z of the highest point of each cell, by storage index, relative to the reference, m; infinite without one.
     highest_m: Vec<f64>,
 }
 
-/// Stage 8, `map_hazards`: the map of the stop before, moved and decayed, with the points of this one. The map begins anew
-/// without one before, or if the size of cell or window has changed.
+/// Stage 8, `map_hazards`: the map of the previous stop, moved and decayed, with the points of this one. Starts a new map
+/// without a previous one, or if the size of cell or window has changed.
 pub fn map_hazards(before: Option<&HazardMap>, scan: &Scan<'_>, settings: &HazardSettings) -> HazardMap {
     let origin = scan.site_from_rover.translation.vector;
     let grid = Grid::around([origin.x, origin.y], settings.cell_m, settings.side_cells());
@@ -91,14 +91,14 @@ pub fn map_hazards(before: Option<&HazardMap>, scan: &Scan<'_>, settings: &Hazar
 }
 
 impl HazardMap {
-    /// The sums of a cell.
+    /// Sums of a cell.
     #[inline]
     pub(super) fn cell(&self, row: usize, column: usize) -> &Moments {
         &self.cells[self.grid.slot(row, column)]
     }
 
-    /// z of the upper edge of a cell whose points spread along z more than those of ground do, as on the face of a rock, from the
-    /// reference, m; `None` for other cells. See `steps.rs`.
+    /// z of the upper edge of a cell whose heights spread more than those of ground, as on the face of a rock, relative to
+    /// the reference, m; `None` for other cells. See `steps.rs`.
     pub(super) fn upper_edge_m(&self, row: usize, column: usize, face_spread_m: f64) -> Option<f64> {
         let slot = self.grid.slot(row, column);
         let cell = &self.cells[slot];
@@ -108,7 +108,7 @@ impl HazardMap {
         Some((cell.mean_height_m() - 3f64.sqrt() * spread_m).max(self.highest_m[slot]))
     }
 
-    /// The map in another window, after a distance.
+    /// The map moved to another window and decayed to a distance driven.
     fn moved(&self, grid: Grid, driven_m: f64, settings: &HazardSettings) -> Self {
         let factor = 0.5_f64.powf((driven_m - self.driven_m).max(0.0) / settings.half_life_m);
         let mut cells = vec![Moments::default(); grid.len()];
@@ -143,17 +143,17 @@ impl HazardMap {
     }
 }
 
-/// A map as it is stored: the cells that have points, by slot.
+/// Serialised form of a map: the cells with points, by storage index.
 #[derive(Serialize, Deserialize)]
 struct Stored {
     grid: Grid,
     height_m: f64,
     driven_m: f64,
-    /// Slot, sums, and z of the highest point.
+    /// Storage index, sums, and z of the highest point.
     cells: Vec<(u32, [f64; SUMS], f64)>,
 }
 
-/// Most cells along a side of a stored map.
+/// Largest number of cells along a side of a stored map.
 const SIDE_MAX: usize = 2000;
 
 impl From<HazardMap> for Stored {

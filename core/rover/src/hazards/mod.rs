@@ -1,4 +1,4 @@
-//! Stage 8, `map_hazards`: how safely each place around the rover can be driven over, from range data, for `select_path`.
+//! Stage 8, `map_hazards`: traversability of the ground around the rover, from range data, for `select_path`.
 //!
 //! ```text
 //! stereo pair ─► range_points ─► map_hazards (sums of cells, kept from stop to stop) ─► assess ─► goodness map
@@ -11,10 +11,12 @@
 //! | `slope` | the slope of the ground, above which steps are measured |
 //! | `goodness` | tilt, roughness, step, certainty, goodness; exemption and start |
 //!
-//! The map is inflated: the goodness of a cell is that of the whole disc around it, so that a path is judged by its centre line.
+//! The map is inflated: the goodness of a cell is that of the whole disc around it, so that a path is evaluated along its
+//! centre line.
 //!
 //! Departures from domain.md 8.2: cells of 0.10 m instead of 0.20 m and a window of 16 m instead of 10 m; the age of the
-//! observations; steps are measured above the slope of the ground. Heights are not corrected for an error of the pose between two stops: they fade with the distance driven.
+//! observations; steps are measured relative to the slope of the ground. Heights are not corrected for pose errors between
+//! two stops: their weights decay with the distance driven.
 //!
 //! Frame: site, z down, m. Sources: domain.md 8; papers.md R9, R99–R102.
 

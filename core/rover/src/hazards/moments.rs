@@ -1,4 +1,4 @@
-//! Sums over points from which a plane is fitted, and the fit.
+//! Sums over points for a plane fit, and the fit.
 //!
 //! ```text
 //! z = a x + b y + c      Sxx = Σx² − (Σx)²/n, …      [Sxx Sxy; Sxy Syy] (a, b) = (Sxz, Syz)
@@ -7,7 +7,7 @@
 //! | symbol | name | unit |
 //! |---|---|---|
 //! | n | number of points, decayed with the distance driven | – |
-//! | x, y, z | position from a reference of the sums, z down | m |
+//! | x, y, z | position relative to a reference of the sums, z down | m |
 //! | – | `odometer`: Σ distance driven at the observation | m |
 //! | σ² | expected variance of a point's height | m² |
 //!
@@ -35,7 +35,7 @@ pub(super) struct Plane {
 const SCATTER_MIN: f64 = 1e-3;
 
 impl Moments {
-    /// Adds a point whose height has this variance, m², and that was seen when the rover had driven `odometer_m`.
+    /// Adds a point with this height variance, m², observed when the rover had driven `odometer_m`.
     #[inline]
     pub(super) fn add(&mut self, [x, y, z]: [f64; 3], odometer_m: f64, variance_m2: f64) {
         let added = [1.0, x, y, z, x * x, x * y, x * z, y * y, y * z, z * z, odometer_m, variance_m2];
@@ -44,7 +44,7 @@ impl Moments {
         }
     }
 
-    /// Multiplies every sum: the points count as that many.
+    /// Multiplies every sum, and so the weight of the points.
     pub(super) fn scale(&mut self, factor: f64) {
         self.0.iter_mut().for_each(|sum| *sum *= factor);
     }
@@ -55,35 +55,35 @@ impl Moments {
         self.0[0]
     }
 
-    /// The mean height; not finite without points.
+    /// Mean height; not finite without points.
     pub(super) fn mean_height_m(&self) -> f64 {
         self.0[3] / self.0[0]
     }
 
-    /// The mean of the points; not finite without any.
+    /// Mean of the points; not finite without points.
     pub(super) fn mean(&self) -> [f64; 3] {
         [1, 2, 3].map(|k| self.0[k] / self.0[0])
     }
 
-    /// Spread of the heights beyond their expected error, 1σ, m; not a number without points.
+    /// Standard deviation of the heights beyond their expected error, m; NaN without points.
     pub(super) fn spread_m(&self) -> f64 {
         let mean_m = self.mean_height_m();
         (self.0[9] / self.0[0] - mean_m * mean_m - self.variance_m2()).max(0.0).sqrt()
     }
 
-    /// The sum of the distances driven at the observations, m.
+    /// Sum of the distances driven at the observations, m.
     #[inline]
     pub(super) fn odometer_m(&self) -> f64 {
         self.0[10]
     }
 
-    /// The mean expected variance of the heights, m². It is not divided by the number of points, because stereo errors of
+    /// Mean expected variance of the heights, m². It is not divided by the number of points, because stereo errors of
     /// neighbouring points are correlated. Not finite without points.
     pub(super) fn variance_m2(&self) -> f64 {
         self.0[11] / self.0[0]
     }
 
-    /// The same sums about a reference that is `x`, `y` before this one.
+    /// The same sums relative to a reference displaced by (−x, −y).
     pub(super) fn shifted(&self, x: f64, y: f64) -> Self {
         let [n, sx, sy, sz, sxx, sxy, sxz, syy, syz, szz, odometer, variance] = self.0;
         Self([
@@ -109,7 +109,7 @@ impl Moments {
         let (xx, xy, yy) = (scatter(sxx, sx, sx), scatter(sxy, sx, sy), scatter(syy, sy, sy));
         let (xz, yz, zz) = (scatter(sxz, sx, sz), scatter(syz, sy, sz), scatter(szz, sz, sz));
         let (determinant, trace) = (xx * yy - xy * xy, xx + yy);
-        // A comparison that is false for NaN as well.
+        // The comparison is false for NaN as well.
         if !(trace > 0.0 && determinant > SCATTER_MIN * trace * trace) {
             return None;
         }

@@ -1,7 +1,7 @@
-//! Range data of a stereo pair: the points that its dense stereo finds, after a reduction of the images.
+//! Range data of a stereo pair: the points of its dense stereo, computed on reduced images.
 //!
-//! Any pair that can be aligned serves: the hazcams (CAHVORE) or a wedge of the mast cameras. Two wedges are two lists of points,
-//! one after the other (R101).
+//! Any pair that can be aligned is accepted: the hazcams (CAHVORE) or a wedge of the mast cameras. Two wedges give two
+//! lists of points, which are added one after the other (R101).
 //!
 //! Frame: that of the cameras (rover), m.
 
@@ -17,7 +17,7 @@ use super::settings::HazardSettings;
 use crate::visual_odometry::reduce::Reduced;
 use crate::visual_odometry::windows::Eye;
 
-/// The error of the points of a stereo pair; `None` for a camera that sees nothing at its centre.
+/// Error of the points of a stereo pair; `None` if the left camera has no ray at its centre.
 pub(crate) fn range_noise(cameras: [&Camera; 2], settings: &HazardSettings) -> Option<RangeNoise> {
     let [left, right] = cameras;
     let centre = Pixel::new(0.5 * f64::from(left.size[0] - 1), 0.5 * f64::from(left.size[1] - 1));
@@ -27,12 +27,12 @@ pub(crate) fn range_noise(cameras: [&Camera; 2], settings: &HazardSettings) -> O
     Some(RangeNoise { camera_in_rover: left.model.centre(), per_m }).filter(|noise| noise.per_m.is_finite())
 }
 
-/// How many times smaller the images are made before stereo.
+/// Factor by which the images are reduced before stereo.
 fn reduction(left: &Camera, settings: &HazardSettings) -> u32 {
     left.size[0].div_ceil(settings.range_width_px).max(1)
 }
 
-/// The points that a stereo pair shows, rover frame, m, row by row of the left image, without those of the rover itself.
+/// The points of a stereo pair, rover frame, m, row by row of the left image, without those of the rover itself.
 ///
 /// # Errors
 /// As [`dense_stereo_about`].
@@ -49,7 +49,7 @@ pub fn range_points(
     }
     let factor = reduction(cameras[0], settings);
     let stereo = settings.stereo();
-    // The ground on which the rover would stand if it were level.
+    // The ground under the rover if it were level.
     let ground = Plane { normal: Vector3::z(), distance_m: settings.ground_below_m };
     let dense = if factor == 1 {
         dense_stereo_about(images, cameras, &ground, &stereo, cancel)?

@@ -1,7 +1,7 @@
 //! Settings of the hazard map: unit, default, range and source of each.
 //!
-//! A term is good up to `…_ok_…` and worst from `…_bad_…` on; between them its goodness falls linearly (`goodness.rs`).
-//! Sources: domain.md 8.2, whose values marked “M” are those commonly reported for MER.
+//! A term has full goodness up to `…_ok_…` and none from `…_bad_…` on; between them its goodness falls linearly
+//! (`goodness.rs`). Sources: domain.md 8.2, whose values marked “M” are those commonly reported for MER.
 
 use sightline_geometry::error::{Error, Result};
 use sightline_track::limits::Domain;
@@ -11,67 +11,69 @@ use sightline_vision::stereo::{StereoMethod, StereoSettings};
 settings_group! {
     /// Settings of the hazard map.
     HazardSettings as "hazards" {
-        /// Side of a cell. Smaller: rocks are sharper, and distant cells lack points.
+        /// Side of a cell. Smaller: rocks are sharper, but distant cells lack points.
         cell_m: f64 = 0.10, "m", Domain::Between(0.05, 0.5), "ours; Goldberg02 has 0.20";
         /// Side of the map, which wraps around the rover.
         side_m: f64 = 16.0, "m", Domain::Between(4.0, 40.0), "ours; Goldberg02 has 10";
         /// Radius of the disc under which the ground is assessed: half the width over the wheels with a margin.
         rover_radius_m: f64 = 0.8, "m", Domain::Between(0.2, 2.0), "ours, after Goldberg02";
-        /// Distance of two cells up to which the difference of their heights above the slope of the ground is a step.
+        /// Largest distance of two cells whose height difference relative to the slope of the ground counts as a step.
         step_reach_m: f64 = 0.4, "m", Domain::Between(0.1, 1.0), "ours, after Goldberg02";
-        /// Tilt of the plane up to which it has full goodness.
+        /// Largest tilt of the plane with full goodness.
         tilt_ok_deg: f64 = 8.0, "deg", Domain::Between(0.0, 45.0), "ours, after Goldberg02";
         /// Tilt from which on the goodness is 0.
         tilt_bad_deg: f64 = 25.0, "deg", Domain::Between(1.0, 60.0), "ours, after Goldberg02";
-        /// RMS residual of the plane up to which it has full goodness.
+        /// Largest RMS residual of the plane with full goodness.
         roughness_ok_m: f64 = 0.04, "m", Domain::Between(0.0, 1.0), "ours, after Goldberg02";
         /// RMS residual from which on the goodness is 0.
         roughness_bad_m: f64 = 0.10, "m", Domain::Between(0.001, 2.0), "ours, after Goldberg02";
-        /// Step up to which it has full goodness.
+        /// Largest step with full goodness.
         step_ok_m: f64 = 0.08, "m", Domain::Between(0.0, 1.0), "ours, after Goldberg02";
         /// Step from which on the goodness is 0.
         step_bad_m: f64 = 0.20, "m", Domain::Between(0.001, 2.0), "ours, after Goldberg02";
-        /// The heights of a cell's points spread by more: they are on the face of an obstacle, which is as high as its upper edge.
+        /// If the heights of a cell's points spread by more, they are on the face of an obstacle, whose height is that of
+        /// its upper edge.
         face_spread_m: f64 = 0.03, "m", Domain::Between(0.0, 2.0), "ours; docs/driving.md";
-        /// Points in the disc from which on their number does not reduce the certainty.
+        /// Number of points in the disc from which on it does not reduce the certainty.
         points_full: f64 = 40.0, "", Domain::Between(3.0, 10_000.0), "ours, after Goldberg02";
         /// A cell is known if its decayed number of points is at least this.
         weight_min: f64 = 0.25, "", Domain::Between(0.001, 100.0), "ours";
-        /// A cell of less certainty is unknown.
+        /// A cell of lower certainty is unknown.
         certainty_min: f64 = 0.3, "", Domain::Between(0.0, 1.0), "ours, after Goldberg02";
         /// Distance driven in which the number of points halves.
         half_life_m: f64 = 5.0, "m", Domain::Between(0.1, 1000.0), "ours, after Goldberg02";
         /// Nearest range of the stereo pair.
         range_min_m: f64 = 0.4, "m", Domain::Between(0.1, 10.0), "ours";
-        /// Points farther from the left camera are left out: their error is larger than the terms.
+        /// Points farther from the left camera are excluded: their error exceeds the terms.
         range_max_m: f64 = 3.5, "m", Domain::Between(1.0, 100.0), "ours";
-        /// The same for a pair on the mast, which looks down more steeply and sees more sharply.
+        /// The same for a pair on the mast, which looks down more steeply and has a higher resolution.
         mast_range_max_m: f64 = 5.0, "m", Domain::Between(1.0, 100.0), "ours; docs/driving.md";
-        /// 1σ of the disparity of a point: its height is that uncertain, and steps must exceed what follows from it.
+        /// 1σ of a point's disparity, from which its height error follows; steps must exceed that error.
         disparity_sigma_px: f64 = 0.25, "px", Domain::Between(0.0, 5.0), "ours; Kim09 §4.2 has 1/3";
-        /// By so many 1σ of their heights' difference two cells must differ, before the rest counts as a step.
+        /// Height difference of two cells that does not count as a step, in 1σ of the difference.
         step_sigmas: f64 = 0.25, "", Domain::Between(0.0, 10.0), "ours";
-        /// Least slope of the image for a match, fraction of full scale per px. Too low: points in the sky; too high: holes.
+        /// Smallest gradient of the image for a match, fraction of full scale per px. Too low: points in the sky; too
+        /// high: holes.
         range_texture_min: f64 = 0.003, "1/px", Domain::Between(0.0, 0.1), "ours; docs/driving.md";
-        /// Share by which the best match must be better than any other.
+        /// Smallest relative margin of the best match over any other.
         range_uniqueness_min: f64 = 0.15, "", Domain::Between(0.0, 1.0), "ours; docs/driving.md";
-        /// Patches of fewer pixels are left out (blob filter).
+        /// Disparity patches of fewer pixels are removed (speckle filter).
         range_speckle_px: u32 = 250, "px", Domain::Between(0.0, 100_000.0), "ours; JPL: 4 % of the image";
-        /// A stop of a drive whose pair gives fewer points has no range data.
+        /// A stop whose pair gives fewer points has no range data.
         range_points_min: u32 = 200, "", Domain::Between(1.0, 100_000.0), "ours";
-        /// Points nearer to the rover's axis along its length and …
+        /// Points within this distance of the rover's origin along its length and …
         own_half_length_m: f64 = 0.95, "m", Domain::Between(0.0, 3.0), "ours: the body of MER";
-        /// … across its width are left out: they are its own wheels and panels.
+        /// … across its width are excluded: they are its own wheels and panels.
         own_half_width_m: f64 = 1.2, "m", Domain::Between(0.0, 3.0), "ours: the body of MER";
-        /// Points higher above the rover's origin are left out: it passes below them, or they are false matches.
+        /// Points higher above the rover's origin are excluded: the rover passes below them, or they are false matches.
         height_max_m: f64 = 2.0, "m", Domain::Between(0.2, 20.0), "ours";
-        /// The ground is this far below the rover's origin: range data are matched about that plane.
+        /// Depth of the ground below the rover's origin: stereo matches relative to that plane.
         ground_below_m: f64 = 0.294, "m", Domain::Between(0.0, 2.0), "VICAR PigMER";
         /// Images wider than this are reduced before stereo.
         range_width_px: u32 = 256, "px", Domain::Between(64.0, 2048.0), "Kim09 §3; flown width";
-        /// Cells nearer to the target count as good (target exemption); 0: none.
+        /// Cells within this distance of the target count as good (target exemption); 0 = none.
         exemption_radius_m: f64 = 0.0, "m", Domain::Between(0.0, 5.0), "Kim09 §6; off";
-        /// Unknown cells nearer to the start count as good …
+        /// Unknown cells within this distance of the start count as good …
         start_radius_m: f64 = 2.0, "m", Domain::Between(0.0, 10.0), "Kim09 §6";
         /// … until the rover is this far from the start: the first map has no data under the rover.
         start_distance_m: f64 = 2.0, "m", Domain::Between(0.0, 10.0), "Kim09 §6";
@@ -79,10 +81,10 @@ settings_group! {
 }
 
 impl HazardSettings {
-    /// Refuses values out of range, and limits that contradict each other.
+    /// Rejects values out of range, and contradictory limits.
     ///
     /// # Errors
-    /// [`Error::Setting`] that names the setting and its range.
+    /// [`Error::Setting`] with the setting and its range.
     pub fn validate(&self) -> Result<()> {
         let document = serde_json::to_value(self).map_err(|e| Error::setting("hazards", e.to_string()))?;
         for info in Self::table() {
@@ -108,7 +110,7 @@ impl HazardSettings {
         Ok(())
     }
 
-    /// The settings for a pair on the mast.
+    /// These settings for a pair on the mast.
     pub(crate) fn of_mast(&self) -> Self {
         Self { range_max_m: self.mast_range_max_m, ..self.clone() }
     }

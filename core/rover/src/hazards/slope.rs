@@ -1,26 +1,26 @@
-//! The slope of the ground around the rover, above which steps are measured: the slope itself is not a step.
+//! The slope of the ground around the rover, relative to which steps are measured.
 //!
 //! ```text
 //! a = median (Δz − b Δy)/Δx   over pairs of cells `step_reach_m` apart along x
 //! b = median (Δz − a Δx)/Δy   over pairs of cells as far apart along y
 //! ```
-//! Δx, Δy, Δz are the differences of the means of two known cells near the rover. Pairs at the edges of rocks and walls are fewer than
-//! the others and of both signs, so that they hardly move a median. The two medians are found in turn, each with the latest value of
-//! the other.
+//! Δx, Δy, Δz are the differences of the means of two known cells near the rover. Pairs at the edges of rocks and walls
+//! are a minority and of both signs, so that they hardly change a median. The two medians are computed alternately, each
+//! with the latest value of the other.
 //!
 //! Frame: axes of the site.
 
 use super::settings::HazardSettings;
 
-/// Half the side of the square around the middle of the window whose cells are used, m: what the rover comes to in a few motions.
+/// Half the side of the square around the rover whose cells are used, m: the ground of the next few motions.
 const HALF_SIDE_M: f64 = 4.0;
-/// How often both medians are found: the means of cells are nearly on a lattice, on which they do not depend on each other.
+/// Iterations of both medians; few suffice, because the cells' means are nearly on a lattice, which decouples them.
 const REPEATED: usize = 3;
-/// Least number of pairs; fewer give no slope.
+/// Smallest number of pairs for a slope.
 const PAIRS_MIN: usize = 50;
 
-/// The slope of the ground along x and y, m/m, from the means of the points of each cell, m; 0 along an axis with few pairs of known
-/// cells.
+/// The slope of the ground along x and y, m/m, from the means of each cell's points, m; 0 along an axis with too few pairs
+/// of known cells.
 pub(super) fn slope(means_m: &[Option<[f64; 3]>], side: usize, settings: &HazardSettings) -> [f64; 2] {
     let pairs = [0, 1].map(|axis| pairs(means_m, side, axis, settings));
     let mut slope = [0.0; 2];
@@ -50,7 +50,7 @@ fn pairs(means_m: &[Option<[f64; 3]>], side: usize, axis: usize, settings: &Haza
     cells.filter_map(pair).collect()
 }
 
-/// The middle value; 0 for fewer than [`PAIRS_MIN`].
+/// The median; 0 for fewer than [`PAIRS_MIN`] values.
 fn median(mut values: Vec<f64>) -> f64 {
     if values.len() < PAIRS_MIN {
         return 0.0;

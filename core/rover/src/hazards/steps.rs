@@ -1,29 +1,29 @@
-//! Steps: the largest difference of the heights of two cells near each other above the slope of the ground, both inside the disc.
+//! Steps: the largest height difference of two nearby cells in the disc, relative to the slope of the ground.
 //!
 //! ```text
 //! step(p) = max (|d(c) − d(c + o)| − k √(σ²(c) + σ²(c + o)))      c ∈ D_p ∩ (D_p − o),  0 < |o| ≤ reach
 //! d(c)    = h(c) − a x(c) − b y(c)
 //! s²(c)   = Σz²/n − z̄² − σ²(c)
 //! edge(c) = max(z̄(c) − √3 s(c), z_top(c))
-//! h(c)    = edge(c) where s(c) > face_spread_m + 2 σ(c) and no cell beside c is as high within face_spread_m, else z̄(c)
+//! h(c)    = edge(c) if s(c) > face_spread_m + 2 σ(c) and no cell beside c is as high within face_spread_m, else z̄(c)
 //! ```
-//! A camera near the ground sees the face of a rock, and little of its top. The points of a face spread evenly from its foot to
-//! its upper edge: by s = H/√12 for a height H, and z̄ is half way up (z down). No point is above that edge, z_top.
-//! Where a cell beside it shows the top, the step to that cell is found anyway, and cells that are partly top and partly ground keep
-//! their mean.
+//! A camera near the ground sees the face of a rock, and little of its top. The points of a face are spread uniformly from
+//! its foot to its upper edge: s = H/√12 for a height H, and z̄ is half way up (z down). No point is above that edge,
+//! z_top. If a cell beside it shows the top, the step to that cell is found anyway, and cells that are partly top and
+//! partly ground keep their mean.
 //!
-//! If the slope were not subtracted, a rock would be too low from its uphill side, by up to the fall of the ground over `reach`, and
-//! too high from its downhill side.
+//! Without the subtraction of the slope, a rock would be too low from its uphill side, by up to the fall of the ground
+//! over `reach`, and too high from its downhill side.
 //!
-//! For each offset o the differences form one image, and the maximum over the intersection of both discs is taken row by
-//! row: a run of l cells is covered by two runs of 2^k ≤ l, whose maxima are computed once for the whole image.
+//! For each offset o the differences form one image, and the maximum over the intersection of both discs is computed row
+//! by row: a run of l cells is covered by two runs of 2^k ≤ l, whose maxima are computed once for the whole image.
 //!
 //! | symbol | meaning |
 //! |---|---|
 //! | a, b | slope of the ground along x and y (`slope.rs`) |
-//! | x(c), y(c) | place of the mean of the points of cell c, m |
+//! | x(c), y(c) | mean position of the points of cell c, m |
 //! | z̄(c), σ²(c) | mean height of the n points of cell c, m, and its expected variance, m² |
-//! | s(c) | spread of their heights beyond that error, m |
+//! | s(c) | standard deviation of their heights beyond that error, m |
 //! | k | `step_sigmas` |
 //! | D_p | disc of the rover's radius around cell p |
 //!
@@ -36,7 +36,7 @@ use super::map::HazardMap;
 use super::settings::HazardSettings;
 use super::slope::slope;
 
-/// The largest step in the disc around every cell, row by row, m; 0 where no two cells are known.
+/// The largest step in the disc around every cell, row by row, m; 0 without a pair of known cells.
 pub(super) fn steps(map: &HazardMap, disc: &Disc, reach: &Disc, settings: &HazardSettings) -> Vec<f32> {
     let side = map.grid.side;
     let heights = heights(map, settings);
@@ -61,7 +61,7 @@ pub(super) fn steps(map: &HazardMap, disc: &Disc, reach: &Disc, settings: &Hazar
     offsets.into_par_iter().map(|offset| largest(&cells, offset, disc)).reduce(nothing, larger)
 }
 
-/// The height of every cell without the slope of the ground, row by row, z down, m, NaN where unknown.
+/// Height of every cell relative to the slope of the ground, row by row, z down, m; NaN if unknown.
 fn heights(map: &HazardMap, settings: &HazardSettings) -> Vec<f32> {
     let (side, cell_m) = (map.grid.side, map.grid.cell_m);
     let mean = |[row, column]: [usize; 2]| {
@@ -94,7 +94,7 @@ fn heights(map: &HazardMap, settings: &HazardSettings) -> Vec<f32> {
     cells().zip(&means_m).map(|cell| above(cell).unwrap_or(f32::NAN)).collect()
 }
 
-/// Replaces every value by the larger one of the two.
+/// Replaces every value by the larger of the two.
 #[inline]
 fn raise(values: &mut [f32], others: &[f32]) {
     for (value, other) in values.iter_mut().zip(others) {
@@ -102,7 +102,7 @@ fn raise(values: &mut [f32], others: &[f32]) {
     }
 }
 
-/// The cells row by row: heights, m, NaN where unknown, and k² times their variances, m².
+/// The cells row by row: heights, m (NaN if unknown), and k² times their variances, m².
 struct Cells {
     heights: Vec<f32>,
     variances: Vec<f32>,
@@ -134,8 +134,8 @@ fn largest(cells: &Cells, offset: [isize; 2], disc: &Disc) -> Vec<f32> {
     steps
 }
 
-/// By how much |h(c) − h(c + o)| exceeds its error, with a margin of zeros on both sides of every row; 0 if one of the cells is
-/// unknown.
+/// The excess of |h(c) − h(c + o)| over its error, with a margin of zeros on both sides of every row; 0 if one of the
+/// cells is unknown.
 fn differences(cells: &Cells, [down, along]: [isize; 2], margin: usize) -> Vec<f32> {
     let side = cells.side;
     let width = side + 2 * margin;
@@ -161,7 +161,7 @@ fn differences(cells: &Cells, [down, along]: [isize; 2], margin: usize) -> Vec<f
     differences
 }
 
-/// Maxima of an image over runs of 1, 2, 4 … pixels of a row, by the first pixel of the run.
+/// Maxima of an image over runs of 1, 2, 4 … pixels of a row, indexed by the first pixel of the run.
 struct Runs {
     levels: Vec<Vec<f32>>,
     width: usize,

@@ -1,4 +1,4 @@
-//! Tests of the hazard map against planes, steps and a reference that visits every cell of every disc.
+//! Tests of the hazard map against planes, steps and a reference implementation that visits every cell of every disc.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -98,11 +98,12 @@ fn a_box_is_a_step_within_the_rovers_radius_of_it() {
 
 #[test]
 fn a_rock_on_a_slope_is_a_step_from_its_uphill_side_too() {
-    // A block with a level top, 0.26 m above the ground at its middle.
+    // A block with a level top, 0.26 m above the ground at its centre.
     let slope = 10f64.to_radians().tan();
     let block = |x: f64, y: f64| if x.abs() < 0.25 && y.abs() < 0.25 { -0.26 } else { -slope * x };
     let map = assessed(block);
-    // The disc reaches 0.15 m into it: 0.2 m from its middle its top is 0.22 m above the slope uphill, and 0.30 m downhill.
+    // The disc extends 0.15 m into it: 0.2 m from its centre its top is 0.22 m above the slope uphill, and 0.30 m
+    // downhill.
     for at in [[0.9, 0.05], [-0.9, 0.05], [0.05, 0.9], [0.05, -0.9]] {
         let step_m = f64::from(map.cell_at(at).unwrap().step_m);
         let edge_m = 0.26 + if at[0].abs() > 0.5 { -0.2 * slope * at[0].signum() } else { 0.0 };
@@ -146,7 +147,7 @@ fn a_face_is_as_high_as_its_upper_edge_whether_its_top_is_seen_or_not() {
         .flat_map(|row| (-150..150).map(move |column| (row, column)))
         .map(|(row, column)| Point3::new(0.01 * f64::from(row), 0.01 * f64::from(column) + 0.005, 0.0));
     let ground: Vec<Point3> = ground.filter(|point| point.x < 1.0).collect();
-    // A face of 0.3 m across the way at 1.05 m; behind it nothing is seen, or its top.
+    // A face of 0.3 m across the path at 1.05 m; behind it no points, or those of its top.
     let face = (0..30).flat_map(|z| {
         (-30..30).map(move |y| Point3::new(1.05, 0.01 * f64::from(y) + 0.005, -0.01 * f64::from(z) - 0.005))
     });
@@ -164,7 +165,7 @@ fn a_face_is_as_high_as_its_upper_edge_whether_its_top_is_seen_or_not() {
     }
 }
 
-/// The mean of a cell from the corner of the window, m; `None` without a point.
+/// The mean of a cell relative to the corner of the window, m; `None` without a point.
 fn mean_of(map: &HazardMap, cell: &[i64; 2]) -> Option<[f64; 3]> {
     let own = map.cell(cell[0] as usize, cell[1] as usize);
     let [x, y, z] = own.mean();
@@ -198,7 +199,7 @@ fn sums_and_steps_are_those_of_a_visit_of_every_cell() {
     let settings =
         HazardSettings { side_m: 5.0, weight_min: 1.0, face_spread_m: 2.0, ..HazardSettings::default() };
     let mut random = Pcg64::seed_from_u64(3);
-    // Holes as well: about a third of the cells have no point.
+    // With holes: about a third of the cells have no point.
     let scattered: Vec<Point3> = (0..3000)
         .map(|_| {
             let mut next = |from: f64, to: f64| random.random_range(from..to);
@@ -245,7 +246,7 @@ fn a_map_that_wrapped_around_is_a_fresh_one() {
     let settings = HazardSettings { side_m: 8.0, ..HazardSettings::default() };
     let height = |x: f64, y: f64| 0.1 * (1.3 * x).sin() * (0.9 * y).cos();
     let seen = points([6.3, -2.1], 3.9, 0.05, height);
-    // Elsewhere first, then 12 m without a point: the window has wrapped and nothing is left.
+    // Elsewhere first, then 12 m without a point: the window has wrapped and no data remain.
     let elsewhere = mapped(None, &points([0.0, 0.0], 3.0, 0.1, height), &pose(-7.0, 3.0), 0.0, &settings);
     let moved = mapped(Some(&elsewhere), &seen, &pose(6.3, -2.1), 20.0, &settings);
     let fresh = mapped(None, &seen, &pose(6.3, -2.1), 20.0, &settings);

@@ -1,12 +1,12 @@
-//! Whether the way of an approach is clear: nothing that the map has under the rover's box is higher than a wheel climbs.
+//! Whether the path of an approach is clear: nothing in the map under the rover's box is higher than a wheel climbs.
 //!
 //! ```text
 //! box       own_half_length_m ahead and behind, rover_radius_m to either side: wheels and body with a margin
 //! height    lowest ground within step_reach_m of a cell − top of the cell
-//! obstacle  a cell that comes under the box, is not under it before, and is higher than the limit of a step
+//! obstacle  a cell under the box during the motion, but not at its start, that is higher than the limit of a step
 //! ```
-//! Discs as those of [`HazardNavigator`](super::navigator::HazardNavigator) reach the target's own rock from 1.3 m away; the box does not.
-//! Cells without range data are passed over.
+//! The discs of [`HazardNavigator`](super::navigator::HazardNavigator) reach the target's own rock from 1.3 m away; the
+//! box does not. Cells without range data are ignored.
 //!
 //! Frame: site, m.
 
@@ -19,22 +19,23 @@ use super::limits::VetoLimits;
 use super::path::Stance;
 use super::settings::NavigatorSettings;
 
-/// Distance of two places of the box along an arc, m, and angle along a turn, rad.
+/// Sampling interval of the box along an arc, m, and angle along a turn, rad.
 const SAMPLE_M: f64 = 0.05;
 const SAMPLE_RAD: f64 = 0.05;
 
-/// Something that is too high for the rover to drive over it.
+/// An obstacle that is too high for the rover to drive over.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Obstacle {
-    /// Its cell, site frame, m.
+    /// Centre of its cell, site frame, m.
     pub(crate) in_site_m: [f64; 2],
-    /// Its height over the ground around it, m.
+    /// Height over the surrounding ground, m.
     pub(crate) height_m: f64,
-    /// The highest step, m.
+    /// Limit of a step, m.
     pub(crate) limit_m: f64,
 }
 
-/// The first obstacle under the rover on its way by arcs to a goal, which is ahead and to the right of it, m; `None` if the way is clear.
+/// The first obstacle under the rover on its path by arcs to a goal ahead and to the right of it, m; `None` if the path is
+/// clear.
 pub(crate) fn obstacle(map: &GoodnessMap, site_from_rover: &Pose, goal_m: [f64; 2]) -> Option<Obstacle> {
     let start = Stance::of(site_from_rover);
     let first = ArcNavigator::default().motion(goal_m, f64::INFINITY);
@@ -63,13 +64,13 @@ pub(crate) fn obstacle(map: &GoodnessMap, site_from_rover: &Pose, goal_m: [f64; 
     None
 }
 
-/// Whether a place is under the rover's box.
+/// Whether a point is under the rover's box.
 fn is_under(map: &GoodnessMap, stance: &Stance, at_m: [f64; 2]) -> bool {
     let [ahead, right] = stance.seen(at_m);
     ahead.abs() < map.settings.own_half_length_m && right.abs() < map.settings.rover_radius_m
 }
 
-/// Stances along a motion, its end included.
+/// Stances along a motion, including its end.
 fn places(from: &Stance, motion: &Motion) -> impl Iterator<Item = Stance> {
     let count = match *motion {
         Motion::Arc { length_m, .. } => length_m.abs() / SAMPLE_M,
@@ -80,7 +81,7 @@ fn places(from: &Stance, motion: &Motion) -> impl Iterator<Item = Stance> {
     (1..=count).map(move |k| from.after(&motion, k as f64 / count as f64))
 }
 
-/// The height of a cell over the lowest ground near it, m; `None` without range data.
+/// Height of a cell over the lowest ground near it, m; `None` without range data.
 fn height_m(map: &GoodnessMap, index: usize) -> Option<f64> {
     let top_m = map.cells[index].top_m?;
     let (side, cell_m) = (map.grid.side, map.grid.cell_m);
@@ -118,7 +119,7 @@ mod tests {
         // The target's own rock: its face is where the box ends.
         assert_eq!(met(rock([2.0, 0.0], 0.3), ahead), None);
         assert!(met(rock([1.7, 0.0], 0.3), ahead).is_some());
-        // The rover stands over it already.
+        // The rover is already over it.
         assert_eq!(met(rock([0.5, 0.0], 0.3), ahead), None);
     }
 

@@ -1,8 +1,8 @@
 //! The smallest change of one limit that opens vetoed paths.
 //!
-//! An arc opens if it passes every check with one limit raised and the others kept. The candidates of the limit of a term are
-//! the largest values of that term under the vetoed paths, rounded up to what the value deserves; the vetoes are checked again on the
-//! same map with each of them.
+//! An arc opens if it passes every check with one limit raised and the others kept. The candidates for the limit of a term
+//! are the largest values of that term under the vetoed paths, rounded up to a sensible number of digits; the vetoes are
+//! checked again on the same map with each of them.
 //!
 //! ```text
 //! limit = bad − g · (bad − ok)   ⟹   bad = (limit − g · ok)/(1 − g)      g: `goodness_min`
@@ -29,25 +29,25 @@ use super::settings::NavigatorSettings;
 pub struct LimitChange {
     /// The term.
     pub term: HazardTerm,
-    /// Its limit in the decision: deg, m, m, share.
+    /// Its limit in the decision: deg, m, m, fraction.
     pub limit: f64,
     /// The raised limit.
     pub raised: f64,
-    /// The setting behind the limit.
+    /// The setting that determines the limit.
     pub setting: String,
-    /// The value of the setting that gives the raised limit.
+    /// Value of the setting for the raised limit.
     pub setting_value: f64,
     /// Indices of the candidates that it opens.
     pub opens: Vec<usize>,
 }
 
 impl LimitChange {
-    /// The change relative to the limit.
+    /// Relative change of the limit.
     pub fn relative(&self) -> f64 {
         self.raised / self.limit - 1.0
     }
 
-    /// The change as a sentence.
+    /// Describes the change in a sentence.
     pub fn sentence(&self) -> String {
         let [raised, limit] = [self.raised, self.limit].map(|value| self.term.text(value));
         let name = self.term.word();
@@ -56,8 +56,8 @@ impl LimitChange {
     }
 }
 
-/// For each term the smallest raised limit that opens a vetoed path of a decision, or the given one; the smallest relative
-/// change first. Terms that open no path are left out.
+/// For each term the smallest raised limit that opens a vetoed path of a decision, or (if given) that path; sorted by
+/// relative change. Terms that open no path are left out.
 pub fn counterfactual(
     choice: &PathChoice,
     input: &PathInput<'_>,
@@ -73,7 +73,7 @@ pub fn counterfactual(
     changes
 }
 
-/// A decision whose vetoes are checked again.
+/// A decision with the inputs to check its vetoes again.
 struct Case<'a> {
     choice: &'a PathChoice,
     map: &'a GoodnessMap,
@@ -93,7 +93,7 @@ impl Case<'_> {
     }
 
     fn path_of<'b>(&'b self, ground: &'b Ground<'b>, candidate: &Candidate) -> Path<'b> {
-        // The veto is that of the driven part alone.
+        // The veto concerns the driven part only.
         Path::new(ground, &self.start, &candidate.motion, 0.0, self.settings)
     }
 
@@ -125,7 +125,7 @@ impl Case<'_> {
     }
 }
 
-/// The next value that is worth a digit: 0.1°, 1 mm, 1 %.
+/// Rounds up to the resolution of the term: 0.1°, 1 mm, 1 %.
 fn rounded_up(value: f64, term: HazardTerm) -> f64 {
     let per_unit = match term {
         HazardTerm::Tilt => 10.0,
@@ -136,7 +136,7 @@ fn rounded_up(value: f64, term: HazardTerm) -> f64 {
     if rounded < value { rounded + 1.0 / per_unit } else { rounded }
 }
 
-/// The setting that gives a limit, with its value; `None` out of its range.
+/// The setting that gives a limit, with its value; `None` if out of its range.
 fn setting_of(
     term: HazardTerm,
     limit: f64,

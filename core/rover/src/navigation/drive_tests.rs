@@ -1,4 +1,4 @@
-//! Complete drives over fields of rocks in a kinematic simulation: motions with errors, poses and heights known exactly.
+//! Complete drives over fields of rocks in a kinematic simulation: motions with errors, exact poses and heights.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -13,24 +13,24 @@ use crate::hazards::{HazardMap, HazardSettings, MapRules, Scan, assess, map_haza
 /// Half the length and width of the rover over its wheels, m (domain.md 5.4).
 const WHEELS_M: [f64; 2] = [0.83, 0.61];
 
-/// A drive on exact motions over a field of rocks.
+/// Parameters of a simulated drive over a field of rocks.
 struct Drive<'a> {
     rocks: &'a [Rock],
-    /// Range and half field of the range data, m and rad.
+    /// Range, m, and half field of view, rad, of the range data.
     view: [f64; 2],
     preset: NavigatorPreset,
     goal: [f64; 2],
-    /// Largest error of a motion: a part of its length, and of the heading, rad.
+    /// Largest errors of a motion: relative to its length, and of the heading, rad.
     error: [f64; 2],
 }
 
-/// How a drive ended.
+/// The result of a drive.
 #[derive(Debug, PartialEq)]
 struct Driven {
     arrived: bool,
     stops: usize,
     driven_m: f64,
-    /// Least distance between a rock and the rectangle over the wheels, m.
+    /// Smallest distance between a rock and the rectangle over the wheels, m.
     clearance_m: f64,
 }
 
@@ -147,7 +147,7 @@ fn a_view_ahead_with_memory_crosses_rock_fields_too() {
     for seed in 20..26 {
         let rocks = rock_field(seed, goal);
         let preset = NavigatorPreset::Gestalt;
-        // Hazcams: 4 m and 60° to either side, nothing under the rover.
+        // Hazcams: 4 m and 60° to either side, no data under the rover.
         let drive = Drive { rocks: &rocks, view: [4.0, 1.05], preset, goal, error: [0.03, 0.02] };
         let driven = drive.run(seed);
         assert!(driven.arrived && driven.clearance_m > 0.0, "{seed}: {driven:?}");

@@ -20,7 +20,7 @@ fn a_goal_within_a_ring_of_rocks_is_enclosed() {
     assert!(blocked.nearest_from_goal_m.unwrap() > 2.5, "outside the ring: {blocked:?}");
     assert!(blocked.sentence().starts_with("bad ground encloses the goal; the nearest place"));
     assert!(choice.motion().is_some());
-    // With a gate in it there is a way.
+    // With a gate in the ring there is a way.
     let gate: Vec<Rock> = ring.iter().copied().filter(|rock| rock.at[1] < 1.0).collect();
     let map = known(&stance, &HazardSettings::default(), |x, y| rocks_height(&gate, x, y));
     let choice = select(NavigatorPreset::Gestalt, &map, &stance, [3.5, 0.0], 0.6);

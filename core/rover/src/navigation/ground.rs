@@ -1,4 +1,4 @@
-//! The goodness map as paths see it: bad cells, and the distance of every cell from them.
+//! The goodness map as input of paths: bad cells, and the distance of every cell from them.
 //!
 //! ```text
 //! clearance = + distance of the nearest bad cell      on cells that are not bad
@@ -14,7 +14,7 @@ use crate::hazards::goodness::{CellBasis, GoodnessCell, GoodnessMap};
 use super::limits::VetoLimits;
 use super::settings::NavigatorSettings;
 
-/// A cell without data, outside the window.
+/// A cell without data, for points outside the window.
 const OUTSIDE: GoodnessCell = GoodnessCell {
     tilt_deg: 0.0,
     roughness_m: 0.0,
@@ -27,14 +27,14 @@ const OUTSIDE: GoodnessCell = GoodnessCell {
     basis: CellBasis::Unknown,
 };
 
-/// Clearance without any bad cell in the window, m.
+/// Clearance if the window has no bad cell, m.
 const FAR_M: f32 = 1e6;
 
 /// A goodness map with the limits of the navigator.
 pub(super) struct Ground<'a> {
     pub(super) map: &'a GoodnessMap,
     pub(super) limits: VetoLimits,
-    /// Row by row, m; negative on bad cells.
+    /// Clearance of the cells, row by row, m; negative on bad cells.
     clearance_m: Vec<f32>,
 }
 
@@ -74,7 +74,7 @@ impl<'a> Ground<'a> {
         self.clearance_m[index] < 0.0
     }
 
-    /// Whether the ground at a position, site frame, m, is bad; not outside the window.
+    /// Whether the ground at a position, site frame, m, is bad; false outside the window.
     pub(super) fn is_bad_at(&self, at_m: [f64; 2]) -> bool {
         self.map.grid.index_at(at_m).is_some_and(|index| self.is_bad(index))
     }
@@ -103,7 +103,7 @@ impl Spot {
     }
 }
 
-/// Distance of every cell from the nearest one that is `wanted`, in cells: one pass down, one pass up.
+/// Distance of every cell from the nearest one whose flag is `wanted`, in cells: one pass down, one pass up.
 fn distances(bad: &[bool], wanted: bool, side: usize) -> Vec<f32> {
     let mut distance: Vec<f32> = bad.iter().map(|bad| if *bad == wanted { 0.0 } else { FAR_M }).collect();
     let diagonal = std::f32::consts::SQRT_2;

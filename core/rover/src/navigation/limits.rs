@@ -3,14 +3,14 @@
 //! ```text
 //! goodness < goodness_min  ⟺  value > bad − goodness_min · (bad − ok)
 //! ```
-//! for each of tilt, roughness and step: the limits are those of the hazard map at the least goodness of the navigator.
+//! for each of tilt, roughness and step: the limits are those of the hazard map at the navigator's smallest goodness.
 
 use crate::hazards::goodness::{CellBasis, GoodnessCell, HazardTerm};
 use crate::hazards::settings::HazardSettings;
 
 use super::settings::NavigatorSettings;
 
-/// Largest value of each term under a path.
+/// Largest allowed value of each term under a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct VetoLimits {
     /// deg.
@@ -19,11 +19,11 @@ pub(super) struct VetoLimits {
     pub(super) roughness_m: f64,
     /// m.
     pub(super) step_m: f64,
-    /// Share of unknown cells.
+    /// Fraction of unknown cells.
     pub(super) unknown_share: f64,
 }
 
-/// Terms of a measured cell.
+/// The terms of a measured cell.
 pub(super) const MEASURED: [HazardTerm; 3] = [HazardTerm::Tilt, HazardTerm::Roughness, HazardTerm::Step];
 
 impl VetoLimits {
@@ -47,7 +47,7 @@ impl VetoLimits {
         }
     }
 
-    /// The same limits with another one for a term.
+    /// The same limits with that of one term replaced.
     pub(super) fn with(mut self, term: HazardTerm, limit: f64) -> Self {
         let changed = match term {
             HazardTerm::Tilt => &mut self.tilt_deg,
@@ -59,8 +59,8 @@ impl VetoLimits {
         self
     }
 
-    /// The term of a measured cell that exceeds its limit most, relative to the limit; `None` for a cell within all limits, and
-    /// for one without a measured goodness.
+    /// The term of a measured cell that exceeds its limit most, relative to the limit; `None` for a cell within all
+    /// limits, and for a cell that is not measured.
     pub(super) fn exceeded(&self, cell: &GoodnessCell) -> Option<HazardTerm> {
         if cell.basis != CellBasis::Measured {
             return None;

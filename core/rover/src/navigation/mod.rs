@@ -1,4 +1,4 @@
-//! Stage 9, `select_path`, on a goodness map: the navigator that drives round hazards, and why it did not take a path.
+//! Stage 9, `select_path`, on a goodness map: the navigator that avoids hazards, and the explanation of its vetoes.
 //!
 //! ```text
 //! goodness map ─► ground (bad cells, clearance) ─► route, way to the goal ─► paths: veto, votes ─► choice ─► counterfactual
@@ -14,8 +14,8 @@
 //! | `reachable` | cells that no closed bad ground separates from the rover |
 //! | `moves` | motions of the search: footprint and cost |
 //! | `search` | search for a way, over positions and headings |
-//! | `way` | the motions of a way, and what the rover follows of it |
-//! | `clear_way` | whether the way of an approach after arrival is clear |
+//! | `way` | the motions of a way, and the part of it that the rover follows |
+//! | `clear_way` | whether the path of an approach after arrival is clear |
 //! | `counterfactual` | smallest change of a limit that opens paths |
 //!
 //! Frame: site, horizontal. Source: domain.md 8.

@@ -2,10 +2,11 @@
 //!
 //! ```text
 //! motions  arcs of `STEP_M` ahead with `CURVATURES` times the tightest curvature, straight back, turns of `HEADING_DEG`
-//! last     within `LAST_M` of the goal: one arc, backwards within `LAST_BACKWARDS_M`, or the turn that faces it and straight ahead
+//! last     within `LAST_M` of the goal: one arc, backwards within `LAST_BACKWARDS_M`, or a turn to it and a straight line
 //! cost     F Δs of an arc, `TURN_M_PER_RAD` |Δψ| of a turn      (F: `route.rs`)
 //! ```
-//! Their footprints are computed once. A motion that starts on bad ground is judged by [`Path`], whose rules for leaving it apply.
+//! Their footprints are computed once. A motion that starts on bad ground is evaluated by [`Path`], whose rules for
+//! leaving it apply.
 //!
 //! Frame: site, horizontal.
 
@@ -31,7 +32,7 @@ pub(super) struct Moves<'a> {
     footprints: Vec<Footprint>,
 }
 
-/// A stance from which motions start.
+/// A stance as the start of motions.
 pub(super) struct Start {
     stance: Stance,
     sine: f64,
@@ -41,7 +42,7 @@ pub(super) struct Start {
 }
 
 impl Footprint {
-    /// The cost of the motion over ground of a mean cost, m.
+    /// Cost of the motion for a mean cost of the ground, m.
     pub(super) fn cost_m(&self, mean_cost: f64) -> f64 {
         match self.motion {
             Motion::Arc { length_m, .. } => length_m.abs() * mean_cost,
@@ -62,7 +63,7 @@ impl Start {
         self.is_free
     }
 
-    /// A position ahead and to the right in the site frame, m.
+    /// Converts a position ahead and to the right to the site frame, m.
     fn place(&self, [ahead, right]: [f64; 2]) -> [f64; 2] {
         let [x, y] = self.stance.at_m;
         [x + self.cosine * ahead - self.sine * right, y + self.sine * ahead + self.cosine * right]
@@ -90,7 +91,7 @@ impl<'a> Moves<'a> {
         &self.footprints
     }
 
-    /// A stance as the start of motions.
+    /// Prepares a stance as the start of motions.
     pub(super) fn start(&self, stance: Stance) -> Start {
         let (sine, cosine) = stance.heading_rad.sin_cos();
         let start = Start { stance, sine, cosine, is_free: true };
@@ -99,7 +100,7 @@ impl<'a> Moves<'a> {
         Start { is_free, ..start }
     }
 
-    /// The cost of one of the motions on the way to the goal of a route; `None` if it is vetoed.
+    /// Cost of one of the motions on the way to the goal of a route; `None` if it is vetoed.
     pub(super) fn cost(&self, start: &Start, footprint: &Footprint, route: &Route<'_>) -> Option<f64> {
         if !start.is_free {
             return self.cost_of(&self.path(&start.stance, footprint), footprint, route);
@@ -112,7 +113,7 @@ impl<'a> Moves<'a> {
         is_safe.then(|| footprint.cost_m(sum / count))
     }
 
-    /// Whether one of the motions is not vetoed.
+    /// Whether one of the motions passes the vetoes.
     pub(super) fn is_safe(&self, start: &Start, footprint: &Footprint) -> bool {
         if !start.is_free {
             return !self.path(&start.stance, footprint).is_bad();
@@ -120,8 +121,8 @@ impl<'a> Moves<'a> {
         self.visit(start, footprint, |_| ())
     }
 
-    /// Visits the cells under the rover's origin, `None` outside the window, up to the first veto; whether there is none. The motion starts
-    /// on free ground, and its footprint is evaluated no farther than it is driven.
+    /// Visits the cells under the rover's origin (`None` outside the window) up to the first veto; returns whether there
+    /// is no veto. The motion must start on free ground, and its footprint is evaluated only over the driven part.
     fn visit(&self, start: &Start, footprint: &Footprint, mut visit: impl FnMut(Option<usize>)) -> bool {
         let is_backwards = footprint.is_backwards();
         for disc in &footprint.discs {
@@ -148,7 +149,7 @@ impl<'a> Moves<'a> {
         Path::along(self.ground, stance, footprint, self.settings)
     }
 
-    /// The cost of a path; `None` if it is vetoed.
+    /// Cost of a path; `None` if it is vetoed.
     fn cost_of(&self, path: &Path<'_>, footprint: &Footprint, route: &Route<'_>) -> Option<f64> {
         (!path.is_bad()).then(|| footprint.cost_m(route.mean_cost(path.centres())))
     }
@@ -158,7 +159,8 @@ impl<'a> Moves<'a> {
         [0.0, self.settings.reach_m].iter().all(|ahead| !self.ground.is_bad_at(stance.place([*ahead, 0.0])))
     }
 
-    /// The last motions to a goal in reverse order, if it is near and they are safe: one arc, or a turn and a straight line.
+    /// The last motions to a goal in reverse order, if it is near and they are safe: one arc, or a turn and a straight
+    /// line.
     pub(super) fn last(&self, stance: &Stance, goal_m: [f64; 2]) -> Option<Vec<Motion>> {
         let [ahead, right] = stance.seen(goal_m);
         let length_m = ahead.hypot(right);
@@ -178,11 +180,11 @@ impl<'a> Moves<'a> {
         is_safe.then(|| vec![straight, turn])
     }
 
-    /// Whether any motion from a stance is not vetoed.
+    /// Whether a motion from a stance passes the vetoes.
     fn is_safe_from(&self, stance: &Stance, motion: &Motion) -> bool {
         let start = self.start(*stance);
         let is_backwards = matches!(*motion, Motion::Arc { length_m, .. } if length_m < 0.0);
-        // The end alone refuses most motions ahead.
+        // The end alone excludes most motions ahead.
         if start.is_free && !is_backwards && !self.can_stand(&stance.after(motion, 1.0)) {
             return false;
         }

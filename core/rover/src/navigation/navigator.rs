@@ -2,32 +2,33 @@
 //!
 //! ```text
 //! aim          the goal, or the nearest place to it where the rover can stand (`stand.rs`)
-//! manoeuvre    the turn or motion backwards with which the way to the aim (`search.rs`) begins; it is chosen
+//! manoeuvre    the turn or backward motion at the start of the way to the aim (`search.rs`), if any; it is chosen
 //! candidates   `curvature_count` arcs, and the arc or turn to a point `look_ahead_m` along the way
 //!              if that turn is vetoed: an arc backwards to that point
-//!              if none passes: a turn to either side, the least multiple of `turn_deg` after which an arc passes
+//!              if none passes: a turn to either side, by the smallest multiple of `turn_deg` after which an arc passes
 //!              if none passes: straight back by `back_up_m`
-//!              if none passes: the motion before, backwards, if it was an arc ahead; it has no veto. Where the rover would stay
-//!              because it can reach no nearer place, only if a way from there leads nearer to the goal
-//! goal         exp(−(Δψ/goal_width)²)     Δψ: heading at the end of the path against the way from there
-//! steer        1 − |κ − κ_now|/(2 κ_max);  0 of a turn
+//!              if none passes: the previous motion, backwards, if it was an arc ahead; it has no veto. If the rover would
+//!              stay because it can reach no nearer place, only if a way from there leads nearer to the goal
+//! goal         exp(−(Δψ/goal_width)²)     Δψ: heading at the end of the path relative to the way from there
+//! steer        1 − |κ − κ_now|/(2 κ_max);  0 for a turn
 //! vote         w_h · hazard + w_g · goal + w_s · steer
 //! choice       the best vote without a veto among paths with goal ≥ `GOAL_MIN`, else among all; ties: the smaller |κ|
 //! ```
 //! | symbol | name | unit |
 //! |---|---|---|
-//! | κ, κ_now | curvature of the path, and of the motion before | 1/m |
+//! | κ, κ_now | curvature of the path, and of the previous motion | 1/m |
 //! | κ_max | `curvature_max_per_m` | 1/m |
 //!
-//! The motion before is driven backwards where a rock appears higher from a short distance than it did from farther away, and the ground
+//! The previous motion is reversed when a rock appears higher from a short distance than from farther away, and the ground
 //! straight behind was not seen. It has no veto because the wheels have just passed that ground.
 //!
-//! Without a way the candidates follow the route (`route.rs`), and without a route the straight line. A turn after which no arc passes has
-//! the veto of the arc that gets farthest: a rover in a closed pocket has no safe path, instead of turning for ever.
+//! Without a way the candidates follow the route (`route.rs`), and without a route the straight line. A turn after which
+//! no arc passes has the veto of the arc that gets farthest: a rover in a closed pocket has no safe path, instead of
+//! turning endlessly.
 //!
-//! Departures from domain.md 8.2: way and route, the arc or turn to them, paths that lead away from them only without another, the
-//! leading disc, turns that lead to an arc, both kinds of backing up, and the lower quality of ground near bad cells. Without a map the choice
-//! is that of [`ArcNavigator`].
+//! Departures from domain.md 8.2: way and route, the arc or turn to them, paths that lead away from them only without
+//! another, the leading disc, turns that lead to an arc, both kinds of backing up, and the lower quality of ground near
+//! bad cells. Without a map the choice is that of [`ArcNavigator`].
 //!
 //! Frame: site, horizontal. Source: domain.md 8.2; papers.md R9.
 
@@ -47,21 +48,21 @@ use super::settings::NavigatorSettings;
 use super::stand::Aim;
 use super::way::Way;
 
-/// Nearer to the end of the way's first part than this a path has arrived: its heading does not matter, m.
+/// Within this distance of the end of the way's first part a path counts as arrived, and its heading does not matter, m.
 const AT_END_M: f64 = 0.02;
-/// A path of less agreement with the way leads away from it.
+/// A path with a smaller goal term leads away from the way.
 const GOAL_MIN: f64 = 0.1;
-/// A way leads nearer to the goal if it ends by so much nearer, m.
+/// Smallest reduction of the distance to the goal for which a way counts as leading nearer, m.
 const NEARER_M: f64 = 0.3;
-/// Stances from which a way is searched, before the goal is examined for being enclosed.
+/// Stances from which a way is searched before testing whether the goal is enclosed.
 const STANCES_MAX: usize = 6000;
-/// A pocket that encloses a goal has fewer stances.
+/// Upper limit of the number of stances in a pocket that encloses a goal.
 const POCKET_STANCES_MAX: usize = 1500;
 
 /// A navigator that avoids the hazards of a goodness map.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct HazardNavigator {
-    /// Its settings.
+    /// Settings.
     pub settings: NavigatorSettings,
 }
 
@@ -98,7 +99,7 @@ impl HazardNavigator {
         let route_m = decision.line();
         let manoeuvre = decision.manoeuvre().filter(|_| !stays);
         if stays || decision.way.as_ref().is_some_and(Way::begins_with_manoeuvre) {
-            // Arcs cannot follow it: they are judged by the route.
+            // Arcs cannot follow it: they are evaluated by the route.
             decision.way = None;
         }
         if stays {
@@ -125,8 +126,8 @@ fn is_blocked(candidates: &[Candidate]) -> bool {
     candidates.iter().all(|candidate| candidate.veto.is_some())
 }
 
-/// The index of the path with the highest vote among those without a veto, and if there are any, among those that do not lead away from
-/// the way; of equal votes, the straighter path.
+/// Index of the path with the highest vote among those without a veto, preferring those that do not lead away from the
+/// way; for equal votes, the straighter path.
 fn best(candidates: &[Candidate]) -> Option<usize> {
     let bend = |candidate: &Candidate| candidate.motion.curvature_per_m().abs();
     let safe = || candidates.iter().enumerate().filter(|(_, candidate)| candidate.veto.is_none());
@@ -142,7 +143,7 @@ fn distance_m(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
-/// What all paths of a decision have in common.
+/// Inputs common to all paths of a decision.
 struct Decision<'a> {
     settings: &'a NavigatorSettings,
     ground: &'a Ground<'a>,
@@ -154,7 +155,7 @@ struct Decision<'a> {
 }
 
 impl<'a> Decision<'a> {
-    /// Sets route and way to an aim; where no way leads there, to the nearest place that one leads to.
+    /// Sets route and way to an aim; if no way leads there, to the nearest place with a way.
     fn find_way(&mut self, moves: &Moves<'_>, mut aim: Aim<'a>) -> Aim<'a> {
         loop {
             self.aim_m = aim.at_m;
@@ -194,7 +195,7 @@ impl<'a> Decision<'a> {
         candidates
     }
 
-    /// The motion before, backwards. One that led backwards is not undone: the rover would go to and fro.
+    /// The previous motion, reversed. A backward motion is not reversed: the rover would oscillate.
     fn way_back(&self) -> Option<Candidate> {
         match self.input.before? {
             Motion::Arc { length_m, curvature_per_m } if length_m > 0.0 => {
@@ -205,7 +206,7 @@ impl<'a> Decision<'a> {
         }
     }
 
-    /// Whether a way leads nearer to the goal from the end of a motion than the rover is.
+    /// Whether a way from the end of a motion ends nearer to the goal than the rover is.
     fn leads_nearer(&self, motion: &Motion, goal_m: [f64; 2]) -> bool {
         let moves = Moves::new(self.ground, self.settings);
         let start = self.start.after(motion, 1.0);
@@ -215,14 +216,14 @@ impl<'a> Decision<'a> {
         end_m.is_some_and(|end_m| distance_m(end_m, goal_m) + NEARER_M < distance_m(self.start.at_m, goal_m))
     }
 
-    /// The motion with which the way begins, where that is a manoeuvre without a veto.
+    /// The motion at the start of the way, if it is a manoeuvre without a veto.
     fn manoeuvre(&self) -> Option<Candidate> {
         let candidate = self.judge(&self.way.as_ref()?.manoeuvre(self.input.step_m)?);
         let terms = PathTerms { goal: 1.0, ..candidate.terms };
         Some(Candidate { terms, vote: self.vote(&terms), ..candidate }).filter(|path| path.veto.is_none())
     }
 
-    /// The way, the route or the straight line.
+    /// The line to follow: the way, the route or the straight line.
     fn line(&self) -> Vec<[f64; 2]> {
         match (&self.way, &self.route) {
             (Some(way), _) => way.points().to_vec(),
@@ -231,18 +232,18 @@ impl<'a> Decision<'a> {
         }
     }
 
-    /// Distance to the end of the way's first part, or of the aim, m.
+    /// Distance to the end of the way's first part or to the aim, whichever is smaller, m.
     fn end_distance_m(&self) -> f64 {
         let aim_m = distance_m(self.start.at_m, self.aim_m);
         self.way.as_ref().map_or(aim_m, |way| way.part_m().min(aim_m))
     }
 
-    /// The end of the way's first part, or the aim.
+    /// End of the way's first part, or the aim.
     fn end_m(&self) -> [f64; 2] {
         self.way.as_ref().map_or(self.aim_m, Way::part_end)
     }
 
-    /// Arcs, from the left to the right.
+    /// Arcs, from left to right.
     fn arcs(&self) -> impl Iterator<Item = Motion> {
         let length_m = self.input.step_m.min(self.end_distance_m());
         let (count, max) = (self.settings.curvature_count, self.settings.curvature_max_per_m);
@@ -255,7 +256,7 @@ impl<'a> Decision<'a> {
         self.arcs().chain([self.to_route(ArcNavigator::default().reverse_max_m)]).collect()
     }
 
-    /// The arc or turn to the way; backwards if it is behind within `reverse_max_m`.
+    /// The arc or turn to the way; backwards if the way is behind within `reverse_max_m`.
     fn to_route(&self, reverse_max_m: f64) -> Motion {
         let navigator =
             ArcNavigator { curvature_max_per_m: self.settings.curvature_max_per_m, reverse_max_m };
@@ -273,7 +274,7 @@ impl<'a> Decision<'a> {
         matches!(motion, Motion::Arc { .. }).then(|| self.judge(&motion))
     }
 
-    /// The least turn to a side, in multiples of `turn_deg`, after which an arc passes.
+    /// The smallest turn to a side, in multiples of `turn_deg`, after which an arc passes.
     fn turn_to_an_arc(&self, side: f64) -> Candidate {
         let turn_deg = self.settings.turn_deg;
         let turn = |k: usize| Motion::Turn { angle_rad: side * (k as f64 * turn_deg).to_radians() };
@@ -297,7 +298,7 @@ impl<'a> Decision<'a> {
         Candidate { veto: farthest, ..self.judge(&turn(1)) }
     }
 
-    /// The point that a path heads for at a position, site frame, m.
+    /// The point that a path at a position heads for, site frame, m.
     fn ahead_of(&self, at_m: [f64; 2]) -> [f64; 2] {
         match (&self.way, &self.route) {
             (Some(way), _) => way.ahead(at_m, self.settings.look_ahead_m),

@@ -1,12 +1,12 @@
 //! A path over the ground: samples of its footprint, its veto and its hazard.
 //!
-//! The rover is covered by two discs of its radius, one at its origin and a leading one `reach_m` ahead of it, or behind when it
-//! backs up. A turn has one on either side. So has a tight arc: as it begins, the rear wheels swing outwards. The goodness of a
-//! cell is that of the disc around it, so that each disc is one cell.
+//! Two discs of the rover's radius cover the rover, one at its origin and a leading one `reach_m` ahead of it, or behind
+//! when it backs up. A turn has one on either side, and so has a tight arc: at its start the rear wheels swing outwards.
+//! The goodness of a cell is that of the disc around it, so that each disc is one cell.
 //!
 //! ```text
 //! veto    if a term of a sample exceeds its limit, or more than `unknown_share_max` of the samples are unknown   (driven part)
-//!         backwards if any is unknown, or less certain than `back_certainty_min`
+//!         backwards if any is unknown, or its certainty is below `back_certainty_min`
 //! hazard  = ω min q + (1 − ω) Σ q c/(1 + s) / Σ 1/(1 + s)                                                 (evaluated part)
 //! c       = certainty · ½^(age/age_half_life_m)
 //! ```
@@ -16,8 +16,8 @@
 //! | q | quality of the cell, `ground.rs` | – |
 //! | ω | `worst_weight`: ½ for GESTALT, 0 for Morphin | – |
 //!
-//! A rover that stands on bad cells may leave them: within `escape_m` a disc that was bad at the start may remain so as long as
-//! it gets no deeper into them and the motion brings it farther out. It may not turn there.
+//! A rover on bad cells may leave them: within `escape_m` a disc that was bad at the start may remain so as long as it
+//! gets no deeper into them and the motion brings it farther out. It may not turn there.
 //!
 //! Frame: site, horizontal. Source: domain.md 8.2.
 
@@ -29,18 +29,18 @@ use sightline_geometry::frames::Pose;
 use super::ground::{Ground, Spot};
 use super::settings::NavigatorSettings;
 
-/// Angle of two samples of a turn, rad.
+/// Sampling interval of a turn, rad.
 const TURN_SAMPLE_RAD: f64 = 10.0 * std::f64::consts::PI / 180.0;
 
-/// Curvature from which on an arc is tight, 1/m: the rear corners then swing out by 8 cm and more, the margin of the discs.
+/// Smallest curvature of a tight arc, 1/m: the rear corners then swing out by 8 cm and more, the margin of the discs.
 const TIGHT_PER_M: f64 = 0.35;
 
-/// Position and heading of the rover in the level.
+/// Horizontal position and heading of the rover.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Stance {
     /// x and y of the site frame, m.
     pub(super) at_m: [f64; 2],
-    /// Positive to the right of the site's +x, rad.
+    /// Heading, rad, positive to the right of the site's +x.
     pub(super) heading_rad: f64,
 }
 
@@ -50,20 +50,20 @@ impl Stance {
         Self { at_m: [origin.x, origin.y], heading_rad: site_from_rover.rotation.euler_angles().2 }
     }
 
-    /// A position ahead and to the right of the rover in the site frame, m.
+    /// Converts a position ahead and to the right of the rover to the site frame, m.
     pub(super) fn place(&self, [ahead, right]: [f64; 2]) -> [f64; 2] {
         let (sine, cosine) = self.heading_rad.sin_cos();
         [self.at_m[0] + cosine * ahead - sine * right, self.at_m[1] + sine * ahead + cosine * right]
     }
 
-    /// A position of the site frame ahead and to the right of the rover, m.
+    /// Converts a position of the site frame to one ahead and to the right of the rover, m.
     pub(super) fn seen(&self, at_m: [f64; 2]) -> [f64; 2] {
         let (sine, cosine) = self.heading_rad.sin_cos();
         let (dx, dy) = (at_m[0] - self.at_m[0], at_m[1] - self.at_m[1]);
         [cosine * dx + sine * dy, cosine * dy - sine * dx]
     }
 
-    /// The stance after a part of a motion.
+    /// The stance after a fraction of a motion.
     pub(super) fn after(&self, motion: &Motion, part: f64) -> Self {
         let (moved, turned_rad) = motion.after(part);
         Self { at_m: self.place(moved), heading_rad: self.heading_rad + turned_rad }
@@ -77,10 +77,10 @@ impl Stance {
     }
 }
 
-/// A disc of the footprint at one place of a motion.
+/// A disc of the footprint at one point of a motion.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Disc {
-    /// Its number: the first is that at the rover's origin.
+    /// Index: 0 is the disc at the rover's origin.
     pub(super) number: usize,
     along_m: f64,
     is_driven: bool,
@@ -88,16 +88,16 @@ pub(super) struct Disc {
     pub(super) place_m: [f64; 2],
 }
 
-/// The footprint along a motion, the same for every start.
+/// The footprint along a motion, independent of the start.
 pub(super) struct Footprint {
     pub(super) motion: Motion,
-    /// Where the rover is after it: ahead and to the right of its start, m, and turned to the right, rad.
+    /// Pose after the motion: position ahead and to the right of its start, m, and rotation to the right, rad.
     pub(super) moved: ([f64; 2], f64),
     /// Distances of the discs ahead of the rover's origin, m.
     offsets_m: Vec<f64>,
-    /// In the order of the distance.
+    /// Discs in order of distance.
     pub(super) discs: Vec<Disc>,
-    /// Length over which the hazard is evaluated, m; 0 of a turn.
+    /// Length over which the hazard is evaluated, m; 0 for a turn.
     evaluated_m: f64,
 }
 
@@ -114,13 +114,13 @@ pub(super) struct Path<'a> {
     settings: &'a NavigatorSettings,
     limits: super::limits::VetoLimits,
     ground: &'a Ground<'a>,
-    /// In the order of the distance.
+    /// Samples in order of distance.
     samples: Vec<Sample>,
-    /// Clearance of each disc before the motion.
+    /// Clearance of each disc before the motion, m.
     start_m: [f64; 3],
     is_turn: bool,
     is_backwards: bool,
-    /// Length over which the hazard is evaluated, m; 0 of a turn.
+    /// Length over which the hazard is evaluated, m; 0 for a turn.
     pub(super) evaluated_m: f64,
 }
 
@@ -197,7 +197,7 @@ impl<'a> Path<'a> {
         self.samples.iter().filter(|sample| sample.disc.is_driven)
     }
 
-    /// Bad samples of the driven part that the rover may not pass, in the order of the distance.
+    /// Bad samples of the driven part that the rover may not pass, in order of distance.
     fn failing(&self) -> impl Iterator<Item = &Sample> {
         let mut may_remain = [0, 1, 2].map(|disc| self.start_m[disc] < 0.0 && self.leaves_bad_ground(disc));
         self.driven().filter(move |sample| {
@@ -215,7 +215,7 @@ impl<'a> Path<'a> {
         last.is_some_and(|sample| sample.spot.clearance_m > self.start_m[disc])
     }
 
-    /// Whether the rover may not pass a measured cell of the driven part, or one that is uncertain behind it.
+    /// Whether the driven part fails at a measured cell, or (backwards) at an unknown or uncertain one.
     pub(super) fn is_bad(&self) -> bool {
         self.failing().next().is_some() || (self.is_backwards && self.unknown_share() > 0.0)
     }
@@ -234,19 +234,19 @@ impl<'a> Path<'a> {
         }
     }
 
-    /// Share of unknown samples of the driven part, 0 to 1.
+    /// Fraction of unknown samples of the driven part, 0 to 1.
     pub(super) fn unknown_share(&self) -> f64 {
         let count = self.driven().count().max(1);
         let unknown = self.driven().filter(|sample| self.is_unknown(sample)).count();
         unknown as f64 / count as f64
     }
 
-    /// Largest share of unknown samples; backwards none, because no camera looks there.
+    /// Largest allowed fraction of unknown samples; 0 backwards, because no camera looks there.
     fn unknown_limit(&self) -> f64 {
         if self.is_backwards { 0.0 } else { self.limits.unknown_share }
     }
 
-    /// The first failing cell; `None` for a path that may be driven.
+    /// The first failing cell; `None` if the path passes.
     pub(super) fn veto(&self) -> Option<Veto> {
         let measured = self.failing().find_map(|sample| {
             let term = self.limits.exceeded(&sample.spot.cell)?;
@@ -264,7 +264,7 @@ impl<'a> Path<'a> {
         Some(Veto { in_site_m, along_m: sample.disc.along_m, term, value, limit })
     }
 
-    /// The largest value of a term among the failing cells; the share of unknown samples for `unknown`.
+    /// The largest value of a term among the failing cells; for `unknown`, the fraction of unknown samples.
     pub(super) fn largest(&self, term: HazardTerm) -> f64 {
         match term {
             HazardTerm::Unknown => self.unknown_share(),
@@ -291,7 +291,8 @@ impl<'a> Path<'a> {
         worst_weight * worst + (1.0 - worst_weight) * sum / weights
     }
 
-    /// Certainty of a cell, discounted by the age of its observations; of assumed and exempt cells at least the least one.
+    /// Certainty of a cell, discounted by the age of its observations; for assumed and exempt cells at least the smallest
+    /// one.
     fn certainty(&self, spot: &Spot) -> f64 {
         let certainty = f64::from(spot.cell.certainty);
         let half_life_m = self.settings.age_half_life_m;
@@ -304,7 +305,7 @@ impl<'a> Path<'a> {
     }
 }
 
-/// Whether ground counts as unknown for a rover that backs up: also where little of the disc was seen.
+/// Whether ground counts as unknown for a rover that backs up: also if only a small part of the disc was seen.
 pub(super) fn is_unknown_behind(cell: &GoodnessCell, settings: &NavigatorSettings) -> bool {
     let is_uncertain = f64::from(cell.certainty) < settings.back_certainty_min;
     cell.basis == CellBasis::Unknown || (cell.basis == CellBasis::Measured && is_uncertain)
@@ -322,7 +323,8 @@ fn offsets(motion: &Motion, reach_m: f64) -> Vec<f64> {
     }
 }
 
-/// Parts of a motion at which it is sampled, beyond 1 where more than the driven part is evaluated, and the evaluated length, m.
+/// Fractions of a motion at which it is sampled, beyond 1 if more than the driven part is evaluated, and the evaluated
+/// length, m.
 fn parts(motion: &Motion, evaluated_min_m: f64, settings: &NavigatorSettings) -> (Vec<f64>, f64) {
     let length_m = match *motion {
         Motion::Turn { angle_rad } => {

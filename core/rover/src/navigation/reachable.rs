@@ -2,10 +2,11 @@
 //!
 //! ```text
 //! reachable   cells connected with that of the rover over their eight neighbours, none of them bad
-//!             and, if one of these is on the border of the window, all that are connected with the border: outside is unknown ground
+//!             and, if one of these is on the border of the window, all that are connected with the border: the ground
+//!             outside is unknown
 //! ```
-//! With samples of a path nearer to each other than a cell is wide, a path without a bad sample leaves no region. A region with an exit that is
-//! too narrow for the rover is left to the search (`search.rs`).
+//! Since the samples of a path are closer together than a cell is wide, a path without a bad sample stays in its region. A
+//! region whose exit is too narrow for the rover is left to the search (`search.rs`).
 //!
 //! Frame: site, m.
 
@@ -14,7 +15,7 @@ use super::ground::Ground;
 /// The cells that bad ground does not separate from the rover.
 #[derive(Clone)]
 pub(super) struct Reachable {
-    /// Row by row; `None` if the rover stands on a bad cell or outside the window: then no cell is excluded.
+    /// Row by row; `None` if the rover is on a bad cell or outside the window: then no cell is excluded.
     cells: Option<Vec<bool>>,
 }
 
@@ -71,7 +72,7 @@ mod tests {
     use super::*;
     use crate::hazards::HazardSettings;
 
-    /// Whether places are reachable from the origin over ground of a height function.
+    /// Whether positions are reachable from the origin over ground of a height function.
     fn reached(height: impl Fn(f64, f64) -> f64, places: &[[f64; 2]]) -> Vec<bool> {
         let (stance, settings) = (pose([0.0, 0.0], 0.0), HazardSettings::default());
         // Beyond the corners of the window.
@@ -95,7 +96,7 @@ mod tests {
     fn regions_that_meet_outside_the_window_are_connected() {
         let wall = |x: f64, _: f64| if (2.0..2.5).contains(&x) { -0.4 } else { 0.0 };
         assert_eq!(reached(wall, &[[4.0, 0.0], [2.2, 0.0], [2.2, 7.9]]), [true, false, false]);
-        // Enclosed itself, the rover reaches nothing else.
+        // The rover is enclosed and reaches nothing else.
         let closed = |x: f64, y: f64| if x.hypot(y) > 1.4 && x.hypot(y) < 1.9 { -0.4 } else { 0.0 };
         assert_eq!(reached(closed, &[[0.3, 0.0], [4.0, 0.0], [7.9, 0.0]]), [true, false, false]);
     }

@@ -1,16 +1,16 @@
-//! The goal layer: least cost from every cell to the goal, and the route that follows it downhill.
+//! The goal layer: least cost from every cell to the goal, and the route of steepest descent.
 //!
 //! ```text
 //! |∇T| = F      T(goal) = 0      F = 1/quality, `unknown_cost` on unknown, `bad_cost` on bad cells
 //! ```
-//! Solved by fast marching [Sethian96]: cells are accepted in the order of T; with the lesser neighbours a along x, b along y
+//! Solved by fast marching [Sethian96]: cells are accepted in order of T; with the smaller neighbours a along x, b along y
 //! and f = F · cell:
 //!
 //! ```text
 //! T = (a + b + √(2 f² − (a − b)²))/2   if |a − b| < f,   else  min(a, b) + f
 //! ```
 //! Unlike A* over eight neighbours the result is isotropic, so that its gradient is a heading. A goal outside the window
-//! is reached from its border in a straight line over unknown ground.
+//! is reached from its border along a straight line over unknown ground.
 //!
 //! Frame: site, m.
 
@@ -22,9 +22,9 @@ use crate::hazards::goodness::CellBasis;
 use super::ground::{Ground, Spot};
 use super::settings::NavigatorSettings;
 
-/// Largest cost of ground that is not bad, from its least quality.
+/// Smallest quality, which limits the cost of ground that is not bad.
 const QUALITY_MIN: f64 = 0.1;
-/// Most steps of half a cell along a route.
+/// Largest number of half-cell steps along a route.
 const STEPS_MAX: usize = 2000;
 
 /// Least cost from every cell to a goal.
@@ -50,7 +50,7 @@ impl<'a> Route<'a> {
         let side = grid.side;
         let seeds: Vec<(usize, f32)> = if grid.index_at(goal_m).is_some() {
             let is_near = |index: &usize| distance(*index) <= 2.0 * grid.cell_m as f32;
-            // At the cost of good ground: T is then least at the goal, also where that lies beside bad ground.
+            // At the cost of good ground: T is then minimal at the goal, even next to bad ground.
             (0..grid.len()).filter(is_near).map(|index| (index, distance(index))).collect()
         } else {
             let is_border = |index: &usize| {
@@ -84,7 +84,7 @@ impl<'a> Route<'a> {
         if count > 0.0 { sum / count } else { 1.0 }
     }
 
-    /// The point that is `length_m` along the route from a position; the goal if the route ends before.
+    /// The point at `length_m` along the route from a position; the goal if the route ends before.
     pub(super) fn ahead(&self, from_m: [f64; 2], length_m: f64) -> [f64; 2] {
         let mut last = self.goal_m;
         self.follow(from_m, length_m, |at| last = at);
@@ -176,7 +176,7 @@ fn cell_cost(ground: &Ground<'_>, index: usize, settings: &NavigatorSettings) ->
 fn march(costs: &[f32], side: usize, cell_m: f32, seeds: &[(usize, f32)]) -> Vec<f32> {
     let mut tentative = vec![f32::INFINITY; costs.len()];
     let mut accepted = vec![f32::INFINITY; costs.len()];
-    // Bits of numbers that are not negative are ordered as the numbers are.
+    // Non-negative floating-point numbers have the same order as their bits.
     let mut heap = BinaryHeap::with_capacity(costs.len());
     for (index, cost) in seeds {
         tentative[*index] = *cost;

@@ -1,14 +1,15 @@
 //! The search for a way to the goal, over positions and headings.
 //!
 //! ```text
-//! stance   position and heading; of stances in one square of `CELL_M` and one sector of `HEADING_DEG` the one with the least sum counts
-//! motions  those of `moves.rs`, at last those that end at the goal
+//! stance   position and heading; of all stances in one square of `CELL_M` and one sector of `HEADING_DEG` the one with the
+//!          smallest sum is kept
+//! motions  those of `moves.rs`, finally those that end at the goal
 //! order    A*: sum of the cost so far and T from there (cost: `moves.rs`, T: `route.rs`)
-//! pocket   the search backwards from a place ends after few stances: bad ground encloses it. Motions other than those are not tried
-//!          there, so that a place with a way of its own may seem enclosed.
+//! pocket   if the search backwards from a place ends after few stances, bad ground encloses the place. Only these motions
+//!          are tried, so that a place with another way may seem enclosed.
 //! ```
-//! Every motion is subject to the vetoes of [`super::navigator`], except that of unknown ground, because distant ground becomes known as
-//! the rover approaches it. A gap between rocks that needs a stance between two squares may be missed.
+//! Every motion is subject to the vetoes of [`super::navigator`], except that of unknown ground, because distant ground
+//! becomes known as the rover approaches it. A gap between rocks that requires a stance between two squares may be missed.
 //!
 //! Frame: site, horizontal. Source: hybrid A* [Dolgov08].
 
@@ -30,7 +31,7 @@ use super::settings::NavigatorSettings;
 use super::way::{Way, distance_m};
 
 const CELL_M: f64 = 0.15;
-/// Headings at a place from which ways to it are followed backwards.
+/// Number of headings at a place from which ways to it are followed backwards.
 const POCKET_HEADINGS: u32 = 72;
 
 /// The motions of a way from a pose to a goal, x and y of the site frame, m; `None` if there is none.
@@ -49,36 +50,36 @@ pub fn way(
     }
 }
 
-/// The outcome of a search.
+/// The result of a search.
 pub(super) enum Found {
     /// A way to the goal.
     Goal(Way),
-    /// There is none: a way to the nearest stance to the goal that can be reached.
+    /// No way to the goal: a way to the nearest stance to it that can be reached.
     Nearest(Way),
-    /// The limit of stances was met first, or ways lead out of the window.
+    /// The limit of stances was reached first, or motions lead out of the window.
     Unfinished,
 }
 
-/// A stance that was reached.
+/// A reached stance.
 struct Node {
     stance: Stance,
     /// Sum of the costs up to it, m.
     cost_m: f64,
-    /// The stance before and the motion from there; `None` of the start.
+    /// Index of the previous stance and the motion from it; `None` for the start.
     parent: Option<(usize, Motion)>,
 }
 
-/// A search under way.
+/// State of a search.
 pub(super) struct Search<'a> {
     moves: &'a Moves<'a>,
     route: &'a Route<'a>,
     nodes: Vec<Node>,
-    /// Bits of the sum, and the node. Bits of numbers that are not negative are ordered as the numbers are.
+    /// Open nodes: bits of the sum, and index. Non-negative floating-point numbers have the same order as their bits.
     open: BinaryHeap<(Reverse<u64>, usize)>,
     least: LeastSums,
-    /// Stances from which it has searched on.
+    /// Number of expanded stances.
     count: usize,
-    /// Distance from the goal, m, and the node.
+    /// Smallest distance from the goal, m, with its node.
     nearest: (f64, usize),
     /// Whether a motion leads out of the window.
     leads_out: bool,
@@ -134,7 +135,7 @@ impl<'a> Search<'a> {
                 self.leads_out |= self.moves.is_safe(&start, footprint);
                 continue;
             };
-            // Good ground is the least that a motion costs.
+            // Good ground is the lower bound of a motion's cost.
             if !self.least.is_less(&after, cost_m + footprint.cost_m(1.0) + left_m) {
                 continue;
             }
@@ -148,7 +149,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The way to a node and on by the last motions, which are in reverse order.
+    /// The way to a node and on by the last motions, given in reverse order.
     fn way(&self, mut at: usize, last: Vec<Motion>) -> Way {
         let mut motions = last;
         while let Some((before, motion)) = self.nodes[at].parent {
@@ -160,11 +161,11 @@ impl<'a> Search<'a> {
     }
 }
 
-/// The least sum with which the search has met each square and sector.
+/// The smallest sum found so far in each square and sector.
 struct LeastSums {
     first: [i64; 2],
     side: usize,
-    /// m; infinite where it has met none, negative where it has searched on.
+    /// m; infinite if none was found, negative if the stance was expanded.
     sums_m: Vec<f64>,
 }
 
@@ -176,7 +177,7 @@ impl LeastSums {
         Self { first, side, sums_m: vec![f64::INFINITY; side * side * sector_count()] }
     }
 
-    /// Where the sum of a stance is; `None` outside the window.
+    /// Index of the sum of a stance; `None` outside the window.
     fn index(&self, stance: &Stance) -> Option<usize> {
         let [x, y, sector] = bin_of(stance);
         let within = |number: i64, axis: usize| {
@@ -185,12 +186,12 @@ impl LeastSums {
         Some((within(x, 0)? * self.side + within(y, 1)?) * sector_count() + sector as usize)
     }
 
-    /// Whether a sum is less than all before.
+    /// Whether a sum is smaller than all previous ones.
     fn is_less(&self, stance: &Stance, sum_m: f64) -> bool {
         self.index(stance).is_some_and(|index| sum_m < self.sums_m[index])
     }
 
-    /// Notes a sum; whether it is less than all before.
+    /// Stores a sum if it is smaller than all previous ones; returns whether it is.
     fn lower(&mut self, stance: &Stance, sum_m: f64) -> bool {
         let Some(index) = self.index(stance).filter(|index| sum_m < self.sums_m[*index]) else {
             return false;
@@ -199,22 +200,23 @@ impl LeastSums {
         true
     }
 
-    /// Notes that the search goes on from a stance; whether it has not done so from another one there.
+    /// Marks a stance as expanded; false if another stance of the same square and sector already was.
     fn close(&mut self, stance: &Stance) -> bool {
         let Some(index) = self.index(stance) else { return true };
         std::mem::replace(&mut self.sums_m[index], -1.0) >= 0.0
     }
 }
 
-/// The squares from which a way can lead to a place, x and y of the site frame, m, if bad ground encloses them; `None` if they have
-/// `stances_max` or more stances, if the rover is among them or on bad ground. Ways are followed backwards from the place.
+/// The squares from which a way can lead to a place, x and y of the site frame, m, if bad ground encloses them; `None` if
+/// they have `stances_max` or more stances, or if the rover is among them or on bad ground. Ways are followed backwards
+/// from the place.
 pub(super) fn pocket(
     moves: &Moves<'_>,
     at_m: [f64; 2],
     rover: &Stance,
     stances_max: usize,
 ) -> Option<HashSet<[i64; 2]>> {
-    // A rover on bad ground leaves it by motions that no other stance may take.
+    // A rover on bad ground leaves it by motions that no other stance may use.
     if !moves.start(*rover).is_free() {
         return None;
     }
@@ -285,7 +287,7 @@ mod tests {
 
     #[test]
     fn a_way_out_of_the_window_leaves_the_search_unfinished() {
-        // A corridor to the left of the rover, 2 m wide, whose walls reach the border; the goal is behind its right end.
+        // A corridor to the left of the rover, 2 m wide, with walls up to the border; the goal is behind its right end.
         let settings = NavigatorSettings::default();
         let found = |open: bool| {
             let is_free = |x: f64, y: f64| x.abs() < 1.2 && (y < 1.2 && (open || y > -4.0));

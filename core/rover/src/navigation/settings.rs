@@ -25,22 +25,22 @@ settings_group! {
         curvature_count: u32 = 23, "", Domain::OddBetween(3, 101), "ours, after Goldberg02";
         /// Curvature of the tightest arc.
         curvature_max_per_m: f64 = 1.0, "1/m", Domain::Between(0.05, 5.0), "ours, after Goldberg02";
-        /// Paths are evaluated over at least this length.
+        /// Smallest length over which paths are evaluated.
         evaluated_min_m: f64 = 1.2, "m", Domain::Between(0.1, 5.0), "ours, after Goldberg02";
-        /// Distance of two samples under a path.
+        /// Sampling interval along a path.
         sample_m: f64 = 0.05, "m", Domain::Between(0.01, 0.5), "ours: half a cell";
-        /// Distance of the leading disc of the footprint from the rover's origin: together they cover the front wheels with 8 cm, about a
-        /// cell, around them.
+        /// Distance of the leading disc of the footprint from the rover's origin: both discs cover the front wheels with a
+        /// margin of 8 cm, about a cell.
         reach_m: f64 = 0.45, "m", Domain::Between(0.0, 2.0), "ours";
-        /// Angle of the turns in place that are tried if no arc passes.
+        /// Increment of the turns in place that are tried if no arc passes.
         turn_deg: f64 = 20.0, "deg", Domain::Between(1.0, 180.0), "ours, after Goldberg02";
-        /// Backing up that is tried if no turn passes either; 0: none.
+        /// Distance backwards that is tried if no turn passes either; 0: none.
         back_up_m: f64 = 0.5, "m", Domain::Between(0.0, 5.0), "ours";
-        /// A path is vetoed under which a cell has less goodness, within the driven part.
+        /// A path is vetoed if a cell under its driven part has a lower goodness.
         goodness_min: f64 = 0.15, "", Domain::Between(0.0, 0.99), "ours, after Goldberg02";
-        /// A path is vetoed of which a larger share of cells is unknown, within the driven part.
+        /// A path is vetoed if a larger fraction of the cells under its driven part is unknown.
         unknown_share_max: f64 = 0.30, "", Domain::Between(0.0, 1.0), "ours, after Goldberg02";
-        /// A path backwards is vetoed on ground of less certainty: no camera looks there.
+        /// A path backwards is vetoed on ground of lower certainty: no camera looks there.
         back_certainty_min: f64 = 0.8, "", Domain::Between(0.0, 1.0), "ours";
         /// Weight of the hazard in the vote.
         hazard_weight: f64 = 0.6, "", Domain::Between(0.0, 1.0), "ours, after Goldberg02";
@@ -48,23 +48,23 @@ settings_group! {
         goal_weight: f64 = 0.3, "", Domain::Between(0.0, 1.0), "ours, after Goldberg02";
         /// Weight of steering in the vote.
         steer_weight: f64 = 0.1, "", Domain::Between(0.0, 1.0), "ours, after Goldberg02";
-        /// Angle between heading and route at which the goal term has fallen to 1/e.
+        /// Angle between heading and route at which the goal term is 1/e.
         goal_width_deg: f64 = 25.0, "deg", Domain::Between(1.0, 180.0), "ours, after Goldberg02";
-        /// Weight of the worst cell in the hazard term; the rest is that of the mean.
+        /// Weight of the worst cell in the hazard term; the remainder is that of the mean.
         worst_weight: f64 = 0.5, "", Domain::Between(0.0, 1.0), "ours, after Goldberg02";
         /// Distance driven in which the certainty of a cell halves in the hazard term; 0: never.
         age_half_life_m: f64 = 0.0, "m", Domain::Between(0.0, 1000.0), "ours; off";
         /// Whether the goal term follows a route over the map instead of the straight line to the goal.
         has_route: bool = true, "", Domain::Switch, "ours (D*)";
-        /// Distance of the point on the route that a path heads for.
+        /// Distance along the route of the point that a path heads for.
         look_ahead_m: f64 = 1.0, "m", Domain::Between(0.1, 5.0), "ours";
-        /// Ground nearer to bad cells costs more.
+        /// Distance from bad cells below which ground costs more.
         clearance_m: f64 = 0.3, "m", Domain::Between(0.0, 3.0), "ours";
         /// Cost of unknown ground, in multiples of good ground.
         unknown_cost: f64 = 2.0, "", Domain::Between(1.0, 100.0), "ours";
         /// Cost of the worst ground, in multiples of good ground.
         bad_cost: f64 = 50.0, "", Domain::Between(1.0, 10_000.0), "ours";
-        /// Distance within which a rover that stands on bad cells must have left them.
+        /// Distance within which a rover on bad cells must have left them.
         escape_m: f64 = 0.6, "m", Domain::Between(0.0, 3.0), "ours";
     }
 }
@@ -88,10 +88,10 @@ impl NavigatorPreset {
 }
 
 impl NavigatorSettings {
-    /// Refuses values out of range.
+    /// Rejects values out of range.
     ///
     /// # Errors
-    /// [`Error::Setting`] that names the setting and its range.
+    /// [`Error::Setting`] with the setting and its range.
     pub fn validate(&self) -> Result<()> {
         let document = serde_json::to_value(self).map_err(|e| Error::setting("navigator", e.to_string()))?;
         for info in Self::table() {

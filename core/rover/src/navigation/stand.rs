@@ -1,8 +1,9 @@
-//! Where the rover heads for: its goal, or the nearest place to it where it can stand and that is not enclosed.
+//! The aim of the rover: its goal, or the nearest place to it where it can stand and that is not enclosed.
 //!
-//! It can stand where the disc at its origin and, in one of `HEADINGS` directions, the leading one are on no bad cell (`path.rs`). Unknown
-//! cells count as good: they become known on the way there. A place is enclosed if closed bad ground separates it from the rover
-//! (`reachable.rs`), or if the way to it cannot begin outside a small pocket (`search.rs`).
+//! The rover can stand where, for one of `HEADINGS` directions, the disc at its origin and the leading one are on no bad
+//! cell (`path.rs`). Unknown cells count as good: they become known on the way there. A place is enclosed if closed bad
+//! ground separates it from the rover (`reachable.rs`), or if the way to it cannot begin outside a small pocket
+//! (`search.rs`).
 //!
 //! Frame: site, m.
 
@@ -20,22 +21,22 @@ use super::reachable::Reachable;
 use super::search::{pocket, square_of};
 
 const HEADINGS: u32 = 24;
-/// Other places are looked for up to this distance from the goal, m.
+/// Largest distance from the goal at which other places are searched, m.
 const SEARCH_M: f64 = 3.0;
-/// The rover stays if it is no more than this farther from the goal than the nearest place, m: on another side of a rock there is always a
-/// place that seems a little nearer.
+/// The rover stays if it is no more than this farther from the goal than the nearest place, m: on the other side of a rock
+/// some place always appears slightly nearer.
 const NEAR_M: f64 = 0.3;
-/// Most pockets that are left out.
+/// Largest number of excluded pockets.
 const POCKETS_MAX: usize = 4;
-/// Fewer stances from which a way leads to a place make it a pocket that is not headed for.
+/// A place is in a pocket if ways to it lead from fewer stances than this.
 const STANCES_MIN: usize = 100;
 
-/// A goal that the rover cannot reach, as far as its map shows.
+/// A goal that the rover cannot reach according to its map.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct BlockedGoal {
-    /// The ground on which it cannot stand there; null if the goal is on good ground that bad ground encloses.
+    /// The bad ground at the goal; null if the goal is on good ground that bad ground encloses.
     pub ground: Option<BadGround>,
-    /// The place for which it heads instead, x and y of the site frame, m; null if there is none within 3 m.
+    /// The place that the rover heads for instead, x and y of the site frame, m; null if there is none within 3 m.
     pub nearest_m: Option<[f64; 2]>,
     /// Its distance from the goal, m; null without one.
     pub nearest_from_goal_m: Option<f64>,
@@ -46,13 +47,13 @@ pub struct BlockedGoal {
 pub struct BadGround {
     /// The term.
     pub term: HazardTerm,
-    /// Its value: deg, m, m.
+    /// Value: deg, m, m.
     pub value: f64,
-    /// Its limit, in the same unit.
+    /// Limit, in the same unit.
     pub limit: f64,
 }
 
-/// Where the rover heads for.
+/// The place that the rover heads for.
 #[derive(Clone)]
 pub(super) struct Aim<'a> {
     moves: &'a Moves<'a>,
@@ -60,9 +61,9 @@ pub(super) struct Aim<'a> {
     goal_m: [f64; 2],
     reachable: Reachable,
     pockets: Vec<HashSet<[i64; 2]>>,
-    /// Site frame, m.
+    /// The place, site frame, m.
     pub(super) at_m: [f64; 2],
-    /// Why that is not the goal.
+    /// Why it is not the goal; `None` if it is.
     pub(super) blocked: Option<BlockedGoal>,
 }
 
@@ -88,7 +89,7 @@ impl<'a> Aim<'a> {
         (is_new && other.pockets.len() <= POCKETS_MAX).then_some(other)
     }
 
-    /// The same with another place, the nearest one that a way leads to.
+    /// Replaces the place by the nearest one that a way leads to.
     pub(super) fn replaced_by(self, at_m: [f64; 2]) -> Self {
         let from_goal_m = (at_m[0] - self.goal_m[0]).hypot(at_m[1] - self.goal_m[1]);
         let ground = self.blocked.and_then(|blocked| blocked.ground);
@@ -119,7 +120,7 @@ impl<'a> Aim<'a> {
         Self { at_m: nearest_m.unwrap_or(self.goal_m), blocked: Some(blocked), ..self }
     }
 
-    /// The bad ground that keeps the rover from standing at a place; `None` if it can.
+    /// The bad ground that prevents the rover from standing at a place; `None` if there is none.
     fn bad_spot(&self, at_m: [f64; 2]) -> Option<Spot> {
         let centre = self.moves.ground.spot(at_m);
         if centre.is_bad() {
@@ -153,12 +154,12 @@ impl BlockedGoal {
         }
     }
 
-    /// Whether a rover at this distance from the goal, m, is as near as it can be.
+    /// Whether a rover at this distance from the goal, m, is as near as possible.
     pub(super) fn is_near(&self, from_goal_m: f64) -> bool {
         self.nearest_from_goal_m.is_some_and(|nearest_m| from_goal_m <= nearest_m + NEAR_M)
     }
 
-    /// Why the rover stays where it is.
+    /// Why the rover stays.
     pub fn sentence(&self) -> String {
         let why = self.why();
         match self.nearest_from_goal_m {

@@ -8,7 +8,7 @@ use crate::hazards::{
     GoodnessMap, HazardMap, HazardSettings, HazardTerm, MapRules, Scan, assess, map_hazards,
 };
 
-/// Distance of the points of the range data, m.
+/// Spacing of the points of the range data, m.
 const SPACING_M: f64 = 0.05;
 
 /// A round rock with a flat top.
@@ -28,7 +28,7 @@ pub(super) fn pose(at: [f64; 2], heading_rad: f64) -> Pose {
     Pose::from_parts([at[0], at[1], 0.0].into(), attitude_from_roll_pitch_yaw(0.0, 0.0, heading_rad))
 }
 
-/// Points of a height function that a stance sees: within a range and an angle of its heading, rover frame.
+/// Points of a height function visible from a stance: within a range and an angle of its heading, rover frame.
 pub(super) fn seen(
     stance: &Pose,
     range_m: f64,
@@ -106,7 +106,7 @@ fn a_veto_names_the_first_failing_cell() {
     assert_eq!(straight.motion, Motion::Arc { length_m: 1.0, curvature_per_m: 0.0 });
     let veto = straight.veto.unwrap();
     assert_eq!(veto.term, HazardTerm::Step);
-    // The rock covers a part of its outermost cells, whose mean height is less than its own.
+    // The rock covers only a part of its outermost cells, whose mean height is less than its own.
     assert!(veto.value > veto.limit && veto.value < 0.401 && (veto.limit - 0.182).abs() < 1e-9, "{veto:?}");
     // The rock begins at 1.7 m, the leading disc is 0.45 m ahead and has a radius of 0.8 m: 0.45 m, by whole cells.
     assert!((veto.along_m - 0.45).abs() < 0.101, "{veto:?}");
@@ -130,7 +130,7 @@ fn a_blocked_corridor_has_no_safe_path() {
     assert!(choice.candidates.iter().all(|candidate| candidate.veto.is_some()));
     let turns = choice.candidates.iter().filter(|path| matches!(path.motion, Motion::Turn { .. }));
     assert!(turns.count() >= 2 && choice.candidates.len() >= 27);
-    // From where it came it would get no nearer to the goal either.
+    // Reversing would bring it no nearer to the goal either.
     let before = Some(Motion::Arc { length_m: 0.5, curvature_per_m: 0.4 });
     let after = select_after(before, NavigatorPreset::Gestalt, &map, &stance, [5.0, 0.0], 0.6);
     assert_eq!(after.motion(), None);
@@ -181,7 +181,7 @@ fn a_goal_inside_a_rock_is_replaced_by_the_nearest_place_to_it() {
     assert!((distance(nearest, [3.0, 0.1]) - blocked.nearest_from_goal_m.unwrap()).abs() < 1e-9);
     assert!(choice.motion().is_some() && choice.stays_for().is_none());
     assert!(distance(choice.route_m[choice.route_m.len() - 1], nearest) < 1e-6);
-    // There the rover stays, although it could drive elsewhere.
+    // There the rover stays, although other paths are safe.
     let there = pose(nearest, 0.0);
     let choice = select(NavigatorPreset::Gestalt, &map, &there, [3.0, 0.1], 0.6);
     let sentence = choice.stays_for().unwrap().sentence();
@@ -209,7 +209,7 @@ fn a_way_passes_no_bad_cell_and_ends_at_the_goal() {
             for ahead in [0.0, settings.reach_m] {
                 let disc = at * Point3::new(ahead, 0.0, 0.0);
                 let step_m = f64::from(map.cell_at([disc.x, disc.y]).unwrap().step_m);
-                // Backwards it is the other disc.
+                // Backwards, the other disc leads.
                 let is_back = matches!(*motion, Motion::Arc { length_m, .. } if length_m < 0.0);
                 assert!(step_m <= 0.182 || (is_back && ahead > 0.0), "{motion:?} {k}: {step_m} m");
             }
@@ -218,7 +218,7 @@ fn a_way_passes_no_bad_cell_and_ends_at_the_goal() {
     assert!(distance([at.translation.x, at.translation.y], goal) < 1e-6);
     let heading_rad = at.rotation.euler_angles().2;
     assert!(heading_rad.abs() > 0.3, "it comes from the side: {heading_rad}");
-    // Among walls there is none.
+    // Among walls there is no way.
     let closed = |x: f64, y: f64| if x.abs() > 1.5 || y.abs() > 1.5 { -0.5 } else { 0.0 };
     let map = known(&stance, &HazardSettings::default(), closed);
     assert_eq!(way(&map, &stance, goal, &settings), None);
@@ -243,7 +243,7 @@ fn the_rover_does_not_back_up_over_ground_that_it_has_not_seen() {
                 .find(|path| matches!(path.motion, Motion::Arc { length_m, .. } if length_m < 0.0));
             let veto = back.unwrap().veto.unwrap();
             assert_eq!((veto.term, veto.limit), (HazardTerm::Unknown, 0.0));
-            // It goes back the way that it came, and not to and fro.
+            // It reverses the motion that led here, and does not oscillate.
             let after = |before: Motion| {
                 select_after(Some(before), NavigatorPreset::Gestalt, &map, &stance, [-4.0, 0.0], 0.6).motion()
             };
@@ -284,7 +284,7 @@ fn a_rover_on_bad_cells_may_leave_them_but_not_go_deeper() {
     assert!(choice.motion().is_some());
 }
 
-/// Raises one limit after the other in the settings, and compares the arcs that then pass with the named ones.
+/// Raises one limit after the other in the settings, and compares the arcs that then pass with the reported ones.
 fn check_changes(settings: &HazardSettings, height: fn(f64, f64) -> f64, expected: HazardTerm) {
     let stance = pose([0.0, 0.0], 0.3);
     let map = known(&stance, settings, height);
@@ -329,11 +329,11 @@ fn check_changes(settings: &HazardSettings, height: fn(f64, f64) -> f64, expecte
 
 #[test]
 fn a_raised_limit_opens_exactly_the_paths_it_names() {
-    // A bowl that is steeper to one side, where steps do not matter.
+    // A bowl that is steeper on one side; steps do not matter there.
     let settings = HazardSettings { step_bad_m: 0.6, ..HazardSettings::default() };
     let bowl = |x: f64, y: f64| -0.3 * ((x * x + 1.3 * y * y).sqrt() - 0.1 * y).max(0.4).powi(2);
     check_changes(&settings, bowl, HazardTerm::Tilt);
-    // A wall all around that grows with the bearing.
+    // A surrounding wall that grows with the bearing.
     let wall = |x: f64, y: f64| if x.hypot(y) > 1.5 { -0.22 - 0.02 * y.atan2(x) } else { 0.0 };
     check_changes(&HazardSettings::default(), wall, HazardTerm::Step);
 }

@@ -1,6 +1,6 @@
-//! A way to the goal: motions that the rover can follow where the route is only a line.
+//! A way to the goal: a sequence of motions that the rover can execute, while the route is only a line.
 //!
-//! The first part of a way ends before its first turn of more than `PART_TURN_DEG` or motion backwards: arcs can follow it.
+//! The first part of a way ends before its first turn of more than `PART_TURN_DEG` or backward motion: arcs can follow it.
 //!
 //! Frame: site, horizontal.
 
@@ -9,16 +9,16 @@ use crate::driving::motion::Motion;
 use super::path::Stance;
 
 const PART_TURN_DEG: f64 = 10.0;
-/// Distance of the points of a way, m.
+/// Spacing of the points of a way, m.
 const POINT_M: f64 = 0.05;
 
 /// A way from a stance to a goal.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Way {
     pub(super) motions: Vec<Motion>,
-    /// Its line, site frame, m; a point every `POINT_M`.
+    /// Points of the line, site frame, m, every `POINT_M`.
     points: Vec<[f64; 2]>,
-    /// Number of points of its first part, that of the start included.
+    /// Number of points of its first part, including the start.
     part: usize,
 }
 
@@ -40,32 +40,32 @@ impl Way {
         Self { motions, part: part.unwrap_or(points.len()), points }
     }
 
-    /// Its line, site frame, m.
+    /// Points of the line, site frame, m.
     pub(super) fn points(&self) -> &[[f64; 2]] {
         &self.points
     }
 
-    /// The end of its first part, site frame, m.
+    /// End of the first part, site frame, m.
     pub(super) fn part_end(&self) -> [f64; 2] {
         self.points[self.part - 1]
     }
 
-    /// Length of its first part, m.
+    /// Length of the first part, m.
     pub(super) fn part_m(&self) -> f64 {
         self.points[..self.part].windows(2).map(|pair| distance_m(pair[0], pair[1])).sum()
     }
 
-    /// Its end, site frame, m.
+    /// End of the way, site frame, m.
     pub(super) fn end(&self) -> [f64; 2] {
         self.points[self.points.len() - 1]
     }
 
-    /// Whether it begins with a turn or backwards.
+    /// Whether the way begins with a turn or a backward motion.
     pub(super) fn begins_with_manoeuvre(&self) -> bool {
         self.part == 1
     }
 
-    /// The turn or the motion backwards, of at most `step_m`, with which it begins; `None` where it begins ahead.
+    /// The turn or backward motion, of at most `step_m`, at the start of the way; `None` if it begins ahead.
     pub(super) fn manoeuvre(&self, step_m: f64) -> Option<Motion> {
         let first = self.motions.first().filter(|_| self.part == 1)?;
         Some(match *first {
@@ -76,7 +76,7 @@ impl Way {
         })
     }
 
-    /// The point of its first part that is `length_m` after the one nearest to a position, or the end of that part.
+    /// The point of the first part `length_m` after the one nearest to a position, or the end of that part.
     pub(super) fn ahead(&self, at_m: [f64; 2], length_m: f64) -> [f64; 2] {
         let part = &self.points[..self.part];
         let of = |index: &usize| distance_m(part[*index], at_m);
@@ -96,7 +96,7 @@ pub(super) fn distance_m(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
-/// Motions with those of one kind joined that follow each other.
+/// Joins consecutive motions of the same kind.
 fn joined(motions: Vec<Motion>) -> Vec<Motion> {
     let mut all: Vec<Motion> = Vec::with_capacity(motions.len());
     for motion in motions {

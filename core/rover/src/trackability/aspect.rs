@@ -1,4 +1,4 @@
-//! What is looked at when a place is judged, with its word, its unit and its sentence.
+//! The criteria by which a point is rated as a target, with their name, unit and explanation.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -6,31 +6,31 @@ use utoipa::ToSchema;
 use super::Verdict;
 use sightline_vision::stereo::Outcome;
 
-/// What a place is judged by, in the order in which reasons are given; the table is in the header of the module above.
+/// A criterion of trackability, in the order in which reasons are given; the table is in the header of the parent module.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Aspect {
-    /// What the designation itself says.
+    /// The designation's own result.
     Refused,
-    /// The distance from the image's rim.
+    /// Distance from the image's border.
     Rim,
     /// Pixels without data.
     Data,
-    /// Whether there is a range.
+    /// Whether a range is available.
     Range,
-    /// The score of point stereo, where the ranges are of point stereo.
+    /// Score of point stereo, if the ranges are from point stereo.
     StereoScore,
     /// The nearest depth edge.
     DepthEdge,
     /// Pixels at full scale.
     Saturation,
-    /// Contrast at all.
+    /// Whether there is any contrast.
     Contrast,
     /// The expected error of a match.
     Texture,
-    /// Another place that looks alike.
+    /// Another point with a similar window.
     Likeness,
-    /// Relief beyond a plane.
+    /// Departure of the ranges from a plane.
     Relief,
     /// Pixels that are much darker than the ground.
     Dark,
@@ -38,33 +38,33 @@ pub enum Aspect {
     RangeError,
     /// The spread of the ranges.
     DepthRange,
-    /// How far the surface is turned away.
+    /// Incidence angle of the surface.
     Slant,
 }
 
-/// One criterion of a place.
+/// The result of one criterion.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Criterion {
-    /// What is looked at.
+    /// The criterion.
     pub aspect: Aspect,
-    /// What was measured; null where it could not be.
+    /// The measured value; null if it could not be measured.
     pub value: Option<f64>,
-    /// Its unit; empty for shares and scores.
+    /// Unit of the value; empty for fractions and scores.
     pub unit: String,
-    /// From where on it is risky.
+    /// Limit beyond which it is risky; null without one.
     pub risky: Option<f64>,
-    /// From where on it is bad.
+    /// Limit beyond which it is bad; null without one.
     pub bad: Option<f64>,
     /// Whether larger values are better.
     pub at_least: bool,
-    /// The verdict on this alone.
+    /// Verdict of this criterion alone.
     pub verdict: Verdict,
-    /// Where the limit comes from.
+    /// Source of the limit.
     pub source: String,
 }
 
 impl Aspect {
-    /// All of them.
+    /// All criteria.
     pub const ALL: [Self; 15] = [
         Self::Refused,
         Self::Rim,
@@ -83,7 +83,7 @@ impl Aspect {
         Self::Slant,
     ];
 
-    /// Its word.
+    /// Name of the criterion.
     pub const fn word(self) -> &'static str {
         match self {
             Self::Refused => "designation",
@@ -104,18 +104,18 @@ impl Aspect {
         }
     }
 
-    /// Its letter in a map.
+    /// Letter of the criterion in a map.
     pub fn letter(self) -> char {
         let place = Self::ALL.iter().position(|aspect| *aspect == self).unwrap_or(0);
         char::from(b'A' + place as u8)
     }
 
-    /// The aspect of a letter.
+    /// The criterion of a letter.
     pub fn of_letter(letter: u8) -> Option<Self> {
         Self::ALL.get(usize::from(letter.checked_sub(b'A')?)).copied()
     }
 
-    /// The unit of its value; empty for shares and scores.
+    /// Unit of the value; empty for fractions and scores.
     pub const fn unit(self) -> &'static str {
         match self {
             Self::Rim | Self::DepthEdge | Self::Texture => "px",
@@ -129,7 +129,7 @@ impl Aspect {
         matches!(self, Self::Rim | Self::StereoScore | Self::DepthEdge | Self::Contrast)
     }
 
-    /// Where its limit comes from.
+    /// Source of the limit.
     pub const fn source(self) -> &'static str {
         match self {
             Self::Refused => "Kim09 §3",
@@ -149,7 +149,7 @@ impl Aspect {
         }
     }
 
-    /// The reason in one sentence, for what was measured.
+    /// Explains a verdict on a measured value in one sentence.
     pub fn sentence(self, value: Option<f64>, verdict: Verdict) -> String {
         let v = value.unwrap_or(0.0);
         let percent = 100.0 * v;

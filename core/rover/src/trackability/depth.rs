@@ -1,16 +1,16 @@
-//! What stereo says of a place: its range, the nearest depth edge, and the plane of its window.
+//! Stereo criteria of a point: its range, the nearest depth edge, and the plane of its window.
 //!
-//! A depth edge lies between two neighbours with a disparity, or across a hole of at most `HOLE_PX`, when
+//! A depth edge is between two neighbours with a disparity, or across a hole of at most `HOLE_PX`, when
 //! ```text
 //! │d₁ − d₂│ > edge_share · max(d₁, d₂) + edge_slope · gap
 //! ```
-//! The second part is what the steepest surface makes whose slope the tracker believes. Distances to edges are chamfer
-//! distances (3, 4), within 6 % of Euclid's.
+//! The second term is the disparity step of the steepest surface whose slope the tracker accepts. Distances to edges are
+//! chamfer distances (3, 4), within 6 % of Euclidean ones.
 //!
 //! The inverse range of a plane is linear over the image, as in `locate/template/warnings.rs`.
 //!
-//! Frames: px of the aligned left image, which shows nearly what the left one does, or nodes of a grid of the left image
-//! where the rows of a pair cannot be aligned (`point_ranges`); points in the rover frame, m.
+//! Frames: px of the aligned left image, which is nearly the left one, or nodes of a grid of the left image if the rows of
+//! a pair cannot be aligned (`point_ranges`); points in the rover frame, m.
 
 use std::sync::Arc;
 
@@ -24,24 +24,24 @@ use sightline_track::locate::shape_tracker::surface::StopSurface;
 use sightline_track::locate::template::warnings::{Ranged, departure, plane};
 use sightline_vision::stereo::{DisparityMap, Outcome};
 
-/// Holes that are wider say nothing about the surfaces on their two sides.
+/// Largest width of a hole, px, across which depth edges are searched.
 const HOLE_PX: usize = 24;
-/// Where an aligned pixel is looked up along its ray, m.
+/// Distance along a pixel's ray at which its aligned pixel is looked up, m.
 const ALONG_M: f64 = 5.0;
 /// Samples along a side of a window.
 const SAMPLES: i32 = 5;
-/// Samples below which nothing is said of a window's ranges.
+/// Smallest number of samples for statistics of a window's ranges.
 const SAMPLES_MIN: usize = 9;
-/// How far around a pixel without a range others are asked, px.
+/// Neighbourhood searched for ranges around a pixel without one, px.
 const NEAR_PX: i32 = 2;
-/// How many of them must have one.
+/// Smallest number of neighbours that must have a range.
 const NEAR_MIN: usize = 9;
 
-/// The ranges of a stop, by dense stereo or by point stereo.
+/// The ranges of a stop, from dense stereo or from point stereo.
 pub(super) enum Surface {
-    /// Of every pixel of the aligned left image.
+    /// Ranges of every pixel of the aligned left image.
     Dense(Arc<StopSurface>),
-    /// Of the nodes of a grid of the left image.
+    /// Ranges at the nodes of a grid of the left image.
     Points(PointRanges),
 }
 
@@ -54,7 +54,7 @@ impl Surface {
         }
     }
 
-    /// The points of the map, m, rover frame; NaN where there is none.
+    /// The points of the map, m, rover frame; NaN without a range.
     fn points_m(&self) -> &[[f32; 3]] {
         match self {
             Self::Dense(surface) => &surface.points_m,
@@ -78,7 +78,7 @@ impl Surface {
         }
     }
 
-    /// For each element of the map the distance to the nearest depth edge, px.
+    /// The distance from each element of the map to the nearest depth edge, px.
     ///
     /// An edge between two nodes of a grid is half a spacing away from either of them.
     pub(super) fn edge_distances_px(&self, limits: &TrackabilityLimits) -> Vec<f32> {
@@ -90,7 +90,7 @@ impl Surface {
     }
 }
 
-/// For each pixel of the aligned image the distance to the nearest depth edge, px; infinite where there is none.
+/// The distance from each pixel of the aligned image to the nearest depth edge, px; infinite if there is none.
 pub fn edge_distances(map: &DisparityMap, limits: &TrackabilityLimits) -> Vec<f32> {
     let (width, height) = (map.width as usize, map.height as usize);
     let mut steps = vec![f32::INFINITY; width * height];
@@ -119,7 +119,7 @@ pub fn edge_distances(map: &DisparityMap, limits: &TrackabilityLimits) -> Vec<f3
     steps
 }
 
-/// Spreads distances from the zeros, forth and back.
+/// Distance transform from the zeros, in a forward and a backward pass.
 fn chamfer(distance: &mut [f32], width: usize, height: usize) {
     const STRAIGHT: f32 = 1.0;
     const SLANTED: f32 = 4.0 / 3.0;
@@ -163,12 +163,12 @@ fn chamfer(distance: &mut [f32], width: usize, height: usize) {
     }
 }
 
-/// What dense stereo says of a window.
+/// Statistics of the ranges in a window; each is `None` with too few ranges.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct WindowRanges {
     /// (farthest − nearest)/range.
     pub(super) spread: Option<f64>,
-    /// Largest departure from a plane over the range.
+    /// Largest departure from a plane, relative to the range.
     pub(super) departure: Option<f64>,
     /// Angle between the surface's normal and the line of sight, rad.
     pub(super) incidence_rad: Option<f64>,
@@ -176,14 +176,14 @@ pub(super) struct WindowRanges {
 
 /// The ranges under the pixels of a left image.
 pub(super) struct Ranges<'a> {
-    /// The surface.
+    /// The ranges of the stop.
     pub(super) surface: &'a Surface,
     /// The left camera.
     pub(super) left: &'a Camera,
 }
 
 impl Ranges<'_> {
-    /// The element of the map that shows what a pixel of the left image does.
+    /// The element of the map that corresponds to a pixel of the left image.
     pub(super) fn aligned(&self, pixel: Pixel) -> Option<[u32; 2]> {
         let seen = match self.surface {
             Surface::Dense(surface) => {
@@ -196,12 +196,12 @@ impl Ranges<'_> {
         seen.is_inside(map.width, map.height).then(|| [seen.x.round() as u32, seen.y.round() as u32])
     }
 
-    /// The point under an aligned pixel, or the middle one of its nearest neighbours; of a grid the node alone.
+    /// The point of an aligned pixel, or the median one of its neighbours; in a grid that of the node only.
     pub(super) fn point(&self, [x, y]: [u32; 2]) -> Option<Point3> {
         if let Some(point) = self.at(i64::from(x), i64::from(y)) {
             return Some(point);
         }
-        // The neighbours of a node are as far away as the window reaches.
+        // The neighbours of a node are as far away as the window extends.
         if self.surface.spacing_px() > 1 {
             return None;
         }
@@ -234,7 +234,7 @@ impl Ranges<'_> {
         (point - self.surface.viewpoint()).norm()
     }
 
-    /// What the window of `half_px` around an aligned pixel at `range_m` holds.
+    /// Statistics of the window of `half_px` around an aligned pixel at `range_m`.
     pub(super) fn window(&self, [x, y]: [u32; 2], range_m: f64, half_px: f64) -> WindowRanges {
         let spacing_px = f64::from(self.surface.spacing_px());
         // Whole elements of the map, inside the window.
@@ -268,7 +268,7 @@ impl Ranges<'_> {
         }
     }
 
-    /// Angle between the normal of the plane through the points and the line of sight to their middle, rad.
+    /// Angle between the normal of the plane through the points and the line of sight to their centroid, rad.
     fn incidence_rad(&self, points: &[(f64, f64, Point3)]) -> Option<f64> {
         let sum = points.iter().fold(Vector3::zeros(), |sum, (_, _, point)| sum + point.coords);
         let middle = sum / points.len() as f64;

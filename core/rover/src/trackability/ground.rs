@@ -1,17 +1,17 @@
-//! What lies under the pixels of a stop's left image, made once, and the judgement of any of them.
+//! Trackability of a stop's left image: stereo and noise are computed once, then any pixel can be rated.
 //!
 //! ```text
 //! longest step = min( step_share · R,  step_stretch · R / (tan θ │sin ε│) )
 //! ```
-//! The first is the papers' rule (R104, R105). The second: driving s along the level turns the line of sight by
-//! s │sin ε│/R in the vertical, which foreshortens a window whose surface is seen at θ from its normal by tan θ times
-//! that; R60's nominal change is 10 %.
+//! The first is the papers' rule (R104, R105). The second: a horizontal motion s rotates the line of sight by s │sin ε│/R
+//! in the vertical plane, which foreshortens a window whose surface is seen at θ from its normal by tan θ times that;
+//! R60's nominal change is 10 %.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
 //! | R | `range_m` | m |
 //! | θ | `incidence_rad` | rad |
-//! | ε | angle of the line of sight with the level of the rover frame | rad |
+//! | ε | angle of the line of sight with the horizontal plane of the rover frame | rad |
 
 use std::sync::Arc;
 
@@ -32,10 +32,10 @@ use sightline_vision::image::GrayImage;
 use sightline_vision::image::patch::{self, Patch};
 use sightline_vision::stereo::StereoSettings;
 
-/// A pixel's way in a step of 10 % towards what is straight ahead, as a share of its distance from the image's middle: 1/(1 − 0.1) − 1.
+/// Motion of a pixel in a step of 10 % straight ahead, relative to its distance from the image's centre: 1/(1 − 0.1) − 1.
 const STEP_FLOW: f64 = 0.11;
 
-/// What lies under the pixels of a left image.
+/// Images, ranges and noise of a stop's left image, as input of the criteria.
 pub struct Ground {
     /// The stop.
     pub step: usize,
@@ -53,14 +53,14 @@ pub struct Ground {
     level: f64,
 }
 
-/// A place as it was judged.
+/// The rating of a pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Assessment {
-    /// Where, px.
+    /// The rated pixel.
     pub pixel: Pixel,
     /// The worst verdict of its criteria.
     pub verdict: Verdict,
-    /// The first criterion with that verdict; none where all are good.
+    /// The first criterion with that verdict; `None` if all are good.
     pub reason: Option<Aspect>,
     /// Its criteria.
     pub criteria: Vec<Measured>,
@@ -70,23 +70,23 @@ pub struct Assessment {
     pub longest_step_m: Option<f64>,
 }
 
-/// One criterion as it was measured.
+/// The measurement of one criterion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured {
-    /// What was looked at.
+    /// The criterion.
     pub aspect: Aspect,
-    /// What was measured.
+    /// The measured value; `None` if it could not be measured.
     pub value: Option<f64>,
-    /// From where on it is risky.
+    /// Limit beyond which it is risky.
     pub risky: Option<f64>,
-    /// From where on it is bad.
+    /// Limit beyond which it is bad.
     pub bad: Option<f64>,
-    /// The verdict on this alone.
+    /// Verdict of this criterion alone.
     pub verdict: Verdict,
 }
 
 impl Measured {
-    /// A value against its limits; what could not be measured speaks against nothing.
+    /// Compares a value with its limits; without a value the verdict is good.
     pub fn new(aspect: Aspect, value: Option<f64>, risky: Option<f64>, bad: Option<f64>) -> Self {
         let beyond = |limit: Option<f64>| {
             value.zip(limit).is_some_and(|(v, limit)| if aspect.at_least() { v < limit } else { v > limit })
@@ -99,7 +99,7 @@ impl Measured {
         Self { aspect, value, risky, bad, verdict }
     }
 
-    /// The same as it travels.
+    /// Converts to the serialised form.
     pub fn criterion(&self) -> Criterion {
         Criterion {
             aspect: self.aspect,
@@ -123,20 +123,20 @@ impl Assessment {
         Self { pixel, verdict, reason, criteria, range_m, longest_step_m }
     }
 
-    /// What was measured of the reason.
+    /// The measured value of the reason.
     pub fn value(&self) -> Option<f64> {
         let one = self.criteria.iter().find(|one| Some(one.aspect) == self.reason)?;
         one.value
     }
 
-    /// The reason in one sentence; none where the place is good.
+    /// Explains the reason in one sentence; `None` if all criteria are good.
     pub fn sentence(&self) -> Option<String> {
         self.reason.map(|aspect| aspect.sentence(self.value(), self.verdict))
     }
 }
 
 impl Ground {
-    /// Looks at a stop. Its surface is shared with the trackers of the traverse.
+    /// Computes stereo and noise of a stop. The stereo result is shared with the trackers of the traverse.
     ///
     /// # Errors
     /// [`Error::Target`] when there is no such stop, [`Error::Request`] for a pair that cannot be aligned; file errors.
@@ -149,7 +149,7 @@ impl Ground {
         Self::new_until(stops, step, settings, limits, Cancel::default())
     }
 
-    /// [`Ground::new`], which ends soon after `cancel` is requested.
+    /// [`Ground::new`], cancellable.
     ///
     /// # Errors
     /// As [`Ground::new`], and [`Error::Cancelled`].
@@ -203,7 +203,7 @@ impl Ground {
         self.image.dimensions().into()
     }
 
-    /// Judges a place by all criteria of the images, or until its verdict is as good as certain.
+    /// Rates a pixel by the criteria of the images: by all of them, or (unless `all`) until the verdict is nearly certain.
     pub fn assess(&self, pixel: Pixel, all: bool) -> Assessment {
         let mut criteria = vec![self.rim(pixel)];
         let is_over = |criteria: &[Measured]| {
@@ -223,7 +223,7 @@ impl Ground {
             return Assessment::new(pixel, criteria, seen);
         }
         self.grey_values(&window, &mut criteria);
-        // The dearest one: what is risky already is seldom made worse by it.
+        // The most expensive criterion: it seldom lowers a verdict that is already risky.
         if all || criteria.iter().all(|one| one.verdict == Verdict::Good) {
             let (template, limits) = (&self.settings.template, &self.settings.limits);
             let likeness = texture::likeness(&self.image, pixel, &window, template.search_window_px);
@@ -241,7 +241,7 @@ impl Ground {
         Measured::new(Aspect::Rim, Some(distance), Some(half + flow), Some(half + 1.0))
     }
 
-    /// Range, edges and the window's plane; returns the range and the longest safe step.
+    /// Adds the criteria of range, edges and the window's plane; returns the range and the longest safe step.
     fn depth(&self, pixel: Pixel, criteria: &mut Vec<Measured>) -> Option<(f64, f64)> {
         let ranges = Ranges { surface: &self.surface, left: &self.left };
         let hole = |outcome: sightline_vision::stereo::Outcome| Measured {
@@ -263,12 +263,12 @@ impl Ground {
             (ranges.range_m(&point), f64::from(self.settings.template.template_size_px / 2));
         let (limits, own) = (&self.settings.limits, &self.limits);
         let edge = f64::from(self.edges_px[(at[1] * self.surface.map().width + at[0]) as usize]);
-        // Beyond the focus of the refinement an edge has little say.
+        // Beyond the focus of the refinement an edge has little weight.
         let focus_px = self.settings.template.focus_px;
         let near = if focus_px > 0.0 { (own.edge_risky_focus * focus_px).min(half) } else { half };
         let window = ranges.window(at, range_m, half);
         let error = self.range_error(pixel, range_m);
-        // What stereo errs by looks like relief; far away it is most of it.
+        // Stereo noise resembles relief; far away it is most of it.
         let noise = error.unwrap_or(0.0);
         if let score @ Some(_) = ranges.stereo_score(at) {
             criteria.push(Measured::new(Aspect::StereoScore, score, None, Some(limits.stereo_ncc_min)));
@@ -310,7 +310,7 @@ impl Ground {
         let saturated = texture::share(window, |value| f64::from(value) >= own.saturated_level);
         let dark = texture::share(window, |value| f64::from(value) < own.dark_level * self.level);
         let sigma = texture::match_sigma_px(window, self.noise, own.step_score, &self.focus);
-        // Without a gradient in some direction a match may lie anywhere in the search window.
+        // Without a gradient in some direction a match may be anywhere in the search window.
         let sigma = sigma.unwrap_or(f64::from(self.settings.template.search_window_px));
         let flat = patch::FLAT_STD;
         criteria.extend([
@@ -332,7 +332,7 @@ impl Ground {
     }
 }
 
-/// The middle grey level of what has a range: the ground, not the sky.
+/// The median grey level of the pixels with a range: the ground, not the sky.
 fn ground_level(image: &GrayImage, ranges: &Ranges<'_>) -> f64 {
     let mut levels = Vec::new();
     for y in (0..image.height()).step_by(8) {

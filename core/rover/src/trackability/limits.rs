@@ -1,4 +1,4 @@
-//! The limits of trackability that designation does not have already; those it has are in `limits.rs` and the template's settings.
+//! Limits of trackability beyond those of designation, which are in `limits.rs` and the template's settings.
 
 use serde_json::Value;
 
@@ -12,42 +12,43 @@ settings_group! {
     TrackabilityLimits as "trackability" {
         /// Side of a map's cells.
         cell_px: u32 = 8, "px", Domain::Between(2.0, 64.0), "ours";
-        /// A place is bad whose nearest depth edge is not farther: it lies where the match counts most (`focus_px` less).
+        /// Bad if the nearest depth edge is within this distance, where the match has most of its weight.
+        /// less).
         edge_bad_px: f64 = 3.0, "px", Domain::Between(0.0, 50.0), "ours; Kim09 §5.2";
-        /// A place is risky whose nearest depth edge is not farther than so many widths of the focus (`focus_px`).
+        /// Risky if the nearest depth edge is within this many `focus_px`.
         edge_risky_focus: f64 = 1.5, "", Domain::Between(0.0, 10.0), "ours; docs/trackability.md";
         /// A step between neighbours is a depth edge beyond this share of the disparity …
         edge_share: f64 = 0.03, "", Domain::Between(0.0, 1.0), "ours; warn_boundary";
-        /// … and beyond what the steepest surface makes whose slope is believed, px of disparity per px.
+        /// … and beyond the step of the steepest surface whose slope is accepted, px of disparity per px.
         edge_slope: f64 = 0.5, "px/px", Domain::Between(0.0, 10.0), "ours; STRETCH_LIMIT";
-        /// A place is risky whose surface is turned farther away from the line of sight: what it shows changes on the way.
+        /// Risky if the surface's normal is farther from the line of sight: its appearance changes on the way.
         slant_risky_deg: f64 = 80.0, "deg", Domain::Between(0.0, 90.0), "ours; docs/trackability.md";
-        /// The 3σ error of the range, over the range, from which on a place is risky.
+        /// Risky if the 3σ error of the range, relative to the range, exceeds this.
         range_error_risky: f64 = 0.10, "", Domain::Between(0.0, 10.0), "ours; the step of Kim09 §5.4";
-        /// The same for a bad one.
+        /// Bad if it exceeds this.
         range_error_bad: f64 = 0.33, "", Domain::Between(0.0, 10.0), "ours";
-        /// Pixels count as overexposed from this share of full scale on.
+        /// Pixels count as overexposed from this fraction of full scale on.
         saturated_level: f64 = 0.98, "", Domain::Between(0.0, 1.0), "ours";
-        /// The share of overexposed pixels from which on a place is risky.
+        /// Risky if the fraction of overexposed pixels exceeds this.
         saturated_risky: f64 = 0.02, "", Domain::Between(0.0, 1.0), "ours";
-        /// The same for a bad one.
+        /// Bad if it exceeds this.
         saturated_bad: f64 = 0.25, "", Domain::Between(0.0, 1.0), "ours";
-        /// Pixels count as dark below this share of the ground's middle level.
+        /// Pixels count as dark below this fraction of the ground's median level.
         dark_level: f64 = 0.5, "", Domain::Between(0.0, 1.0), "ours";
-        /// The score that a step of 10 % typically leaves; what it misses disturbs the match.
+        /// The score that typically remains after a step of 10 %; the remainder to 1 disturbs the match.
         step_score: f64 = 0.95, "", Domain::Between(0.0, 1.0), "ours; Kim09 §7.1 has 0.79 to 0.94";
-        /// The expected error of a match from which on a place is risky: half of the papers' half pixel.
+        /// Risky if the expected error of a match exceeds this: half of the papers' half pixel.
         match_sigma_risky_px: f64 = 0.25, "px", Domain::Between(0.0, 10.0), "ours; Deans05 §2";
-        /// The same for a bad one: the papers' half pixel.
+        /// Bad if it exceeds this: the papers' half pixel.
         match_sigma_bad_px: f64 = 0.5, "px", Domain::Between(0.0, 10.0), "ours; Deans05 §2";
-        /// The longest safe step as a share of the range.
+        /// The longest safe step as a fraction of the range.
         step_share: f64 = 0.10, "", Domain::Between(0.0, 1.0), "Kim09 §5.4";
-        /// How much the window may be foreshortened in a step.
+        /// Largest foreshortening of the window in a step.
         step_stretch: f64 = 0.10, "", Domain::Between(0.0, 1.0), "Kim09 §4.3.3";
     }
 }
 
-/// Limits of which the first must not lie beyond the second: between them a place is risky.
+/// Limits of which the first must not exceed the second: between them the verdict is risky.
 const PAIRS: [[&str; 2]; 3] = [
     ["range_error_risky", "range_error_bad"],
     ["saturated_risky", "saturated_bad"],
@@ -55,10 +56,10 @@ const PAIRS: [[&str; 2]; 3] = [
 ];
 
 impl TrackabilityLimits {
-    /// These limits with `changes` applied; an unknown name or a value out of range changes nothing.
+    /// These limits with `changes` applied, or an error for an unknown name or a value out of range.
     ///
     /// # Errors
-    /// [`Error::Setting`] naming the limit, what is wrong with it, and what it may be.
+    /// [`Error::Setting`] with the limit, the problem and the allowed values.
     pub fn with(&self, changes: &Changes) -> Result<Self> {
         let table = Self::table();
         let mut document = serde_json::to_value(self).map_err(|e| Error::setting("", e.to_string()))?;
@@ -75,7 +76,7 @@ impl TrackabilityLimits {
         serde_json::from_value(document).map_err(|e| Error::setting("limits", e.to_string()))
     }
 
-    /// The limits of a text such as `edge_bad_px=4,slant_risky_deg=70`; those that it does not name are the defaults.
+    /// Parses limits from a text such as `edge_bad_px=4,slant_risky_deg=70`; limits not named there keep their defaults.
     ///
     /// # Errors
     /// As [`Self::with`]; a part without `=`, and a limit that is named twice.
@@ -104,7 +105,7 @@ impl TrackabilityLimits {
         Self::table().into_iter().filter_map(changed).collect()
     }
 
-    /// Changed limits as [`Self::parse`] reads them.
+    /// Changed limits in the form that [`Self::parse`] reads.
     pub fn text(changes: &Changes) -> String {
         changes.iter().map(|(key, value)| format!("{key}={value}")).collect::<Vec<_>>().join(",")
     }

@@ -1,7 +1,8 @@
-//! The map of a stop: a verdict for every cell of the left image, made row by row.
+//! The map of a stop: a verdict for every cell of the left image, computed row by row.
 //!
-//! It travels as letters and short numbers, one a cell, row by row from the top: `verdicts` with `g`, `r` and `b`, `reasons` with
-//! a letter of [`Aspect`] or `-`, and what was measured. A cell is judged by the pixel nearest its middle.
+//! It is serialised as letters and short numbers, one a cell, row by row from the top: `verdicts` with `g`, `r` and `b`,
+//! `reasons` with a letter of [`Aspect`] or `-`, and the measured values. A cell has the verdict of the pixel nearest its
+//! centre.
 
 use std::collections::BTreeMap;
 
@@ -14,10 +15,10 @@ use super::{Aspect, Verdict};
 use sightline_geometry::frames::Pixel;
 use sightline_track::settings::Changes;
 
-/// The letter of a cell that has no reason.
+/// The letter of a cell without a reason.
 const NONE: char = '-';
 
-/// A map, as far as it was made.
+/// A map, possibly with only its first rows.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct TrackabilityMap {
     /// The stop.
@@ -28,51 +29,51 @@ pub struct TrackabilityMap {
     pub columns: usize,
     /// Rows of cells.
     pub rows: usize,
-    /// The limits that it was made with, as far as they are not the defaults, by name.
+    /// The limits that differ from the defaults, by name.
     #[serde(default)]
     #[schema(value_type = Object)]
     pub limits: Changes,
-    /// Side of the window that was judged, px.
+    /// Side of the rated window, px.
     pub template_size_px: u32,
-    /// The verdicts of the rows that were made: `g` good, `r` risky, `b` bad.
+    /// Verdicts of the computed rows: `g` good, `r` risky, `b` bad.
     pub verdicts: String,
-    /// Their reasons: the letters of `words`, or `-`.
+    /// Reasons: the letters of `words`, or `-`.
     pub reasons: String,
-    /// What was measured of the reason, in its unit.
+    /// Measured values of the reasons, in their units.
     pub values: Vec<Option<f32>>,
     /// Distances from the left camera, m.
     pub ranges_m: Vec<Option<f32>>,
     /// The longest safe steps, m.
     pub longest_steps_m: Vec<Option<f32>>,
-    /// What the letters of the reasons stand for.
+    /// Names of the letters of the reasons.
     pub words: BTreeMap<String, String>,
 }
 
-/// How far a map is.
+/// Progress of a map.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct MapProgress {
     /// Rows of cells done.
     pub k: usize,
-    /// Rows of cells in all; 0 before the surface is known.
+    /// Total number of rows of cells; 0 before stereo is done.
     pub n: usize,
-    /// Whether nothing more will come.
+    /// Whether the computation has ended.
     pub ended: bool,
-    /// Why it ended before its time, as one sentence.
+    /// Why it ended early, as one sentence.
     pub failed: Option<String>,
-    /// What there is.
+    /// The map so far.
     pub map: Option<TrackabilityMap>,
 }
 
 /// A cell of a map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
-    /// The pixel that was judged.
+    /// The rated pixel.
     pub pixel: Pixel,
     /// The verdict.
     pub verdict: Verdict,
-    /// The reason, where it is not good.
+    /// The reason; `None` if the cell is good.
     pub reason: Option<Aspect>,
-    /// What was measured of the reason.
+    /// The measured value of the reason.
     pub value: Option<f64>,
     /// Distance from the left camera, m.
     pub range_m: Option<f64>,
@@ -81,13 +82,13 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// The reason in one sentence; none where the cell is good.
+    /// Explains the reason in one sentence; `None` if the cell is good.
     pub fn sentence(&self) -> Option<String> {
         self.reason.map(|aspect| aspect.sentence(self.value, self.verdict))
     }
 }
 
-/// Three digits, as short as JSON writes them.
+/// Rounds to three digits, for short JSON.
 fn short(value: Option<f64>) -> Option<f32> {
     let value = value.filter(|value| value.is_finite())?;
     let unit = 10_f64.powi(2 - value.abs().max(1e-6).log10().floor() as i32);
@@ -95,7 +96,7 @@ fn short(value: Option<f64>) -> Option<f32> {
 }
 
 impl TrackabilityMap {
-    /// A map without any row yet.
+    /// A map without rows.
     pub fn empty(ground: &Ground) -> Self {
         let [width, height] = ground.size();
         let cell_px = ground.limits.cell_px.max(2);
@@ -122,12 +123,12 @@ impl TrackabilityMap {
         map
     }
 
-    /// How many rows were made.
+    /// Number of computed rows.
     pub fn rows_done(&self) -> usize {
         self.verdicts.len().checked_div(self.columns).unwrap_or(0)
     }
 
-    /// Judges a row of cells.
+    /// Rates a row of cells.
     pub fn judge_row(&self, ground: &Ground, row: usize) -> Vec<Assessment> {
         let size = ground.size();
         (0..self.columns)
@@ -155,7 +156,7 @@ impl TrackabilityMap {
         Pixel::new(at(cell[0], size[0]), at(cell[1], size[1]))
     }
 
-    /// The cell in a column and a row; none where it was not made.
+    /// The cell in a column and a row; `None` if it is not computed.
     pub fn cell(&self, column: usize, row: usize) -> Option<Cell> {
         if column >= self.columns {
             return None;
@@ -180,19 +181,19 @@ impl TrackabilityMap {
         self.cell(index(pixel.x)?, index(pixel.y)?)
     }
 
-    /// All cells that were made.
+    /// All computed cells.
     pub fn cells(&self) -> impl Iterator<Item = Cell> {
         (0..self.rows_done())
             .flat_map(move |row| (0..self.columns).filter_map(move |column| self.cell(column, row)))
     }
 
-    /// The good cell nearest to a pixel, among the rows that were made.
+    /// The good cell nearest to a pixel, among the computed rows.
     pub fn nearest_good(&self, pixel: Pixel) -> Option<Pixel> {
         let good = self.cells().filter(|cell| cell.verdict == Verdict::Good).map(|cell| cell.pixel);
         good.min_by(|a, b| a.distance(pixel).total_cmp(&b.distance(pixel)))
     }
 
-    /// Shares of good, risky and bad among the cells that were made.
+    /// Fractions of good, risky and bad cells among the computed ones.
     pub fn shares(&self) -> [f64; 3] {
         let all = self.verdicts.len().max(1) as f64;
         Verdict::ALL.map(|verdict| self.verdicts.matches(verdict.letter()).count() as f64 / all)

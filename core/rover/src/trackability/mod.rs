@@ -1,4 +1,4 @@
-//! Trackability: how well a target would do at each place of a left image, before one is picked (R20, R21).
+//! Trackability: rates each pixel of a left image as a target before one is designated (R20, R21).
 //!
 //! ```text
 //! pair ─► dense stereo ─► ranges, depth edges ┐      point stereo on a grid where the pair is convergent
@@ -7,9 +7,9 @@
 //! ```
 //! | criterion | value | unit | risky | bad | source |
 //! |---|---|---|---|---|---|
-//! | `rim` | from the pixel to the image's rim | px | half a window and what a step of 10 % moves it | half a window | ours |
+//! | `rim` | distance to the image's border | px | half a window + its motion in a step of 10 % | half a window | ours |
 //! | `data` | pixels of the window without data | share | – | any | R66 |
-//! | `range` | dense stereo's outcome | – | – | a hole | R19, R187 |
+//! | `range` | outcome of dense stereo | – | – | a hole | R19, R187 |
 //! | `stereo_score` | correlation of point stereo, on convergent pairs | – | – | `stereo_ncc_min` | R82 |
 //! | `range_error` | 3σ of the range over the range: `R Δd/(f B)` | share | `range_error_risky` | `range_error_bad` | K-Eq 1, R35 |
 //! | `depth_edge` | to the nearest jump of the disparity | px | `edge_risky_focus` · `focus_px` | `edge_bad_px` | R119, ours |
@@ -20,16 +20,16 @@
 //! | `dark` | pixels much darker than the ground | share | `warn_shadow_share` | – | R21 |
 //! | `contrast` | standard deviation over full scale | share | `warn_contrast` | none at all | R21 |
 //! | `texture` | expected 1σ of a match, worst direction | px | `match_sigma_risky_px` | `match_sigma_bad_px` | ours |
-//! | `likeness` | best score of the window with another place of the search area | – | `far_ncc_min` | `renew_ncc` | R68 |
-//! | `refused` | what the designation itself says | – | a warning | a refusal | R16, R21 |
+//! | `likeness` | best score of the window at another position of the search area | – | `far_ncc_min` | `renew_ncc` | R68 |
+//! | `refused` | result of the designation itself | – | a warning | a refusal | R16, R21 |
 //!
-//! All of it is evidence of the images; the truth of a simulation has no part. So `dark` is not called shadow: a dark
-//! stone is dark too.
+//! All criteria are computed from the images; a simulation's ground truth is not used. Therefore `dark` is not called
+//! shadow: a dark stone is dark too.
 //!
-//! A map is made on a grid of cells, row by row, from one dense stereo of the pair (`map`); a single pixel is judged by
-//! designating it (`pixel`), so that *good* there means that the designation succeeds.
+//! A map is computed on a grid of cells, row by row, from one dense stereo result of the pair (`map`). A single pixel is
+//! rated by designating it (`pixel`), so that *good* there means that the designation succeeds.
 //!
-//! What the numbers are worth against the truth is measured by the experiment `trackability` (docs/trackability.md).
+//! The experiment `trackability` compares the verdicts with the ground truth (docs/trackability.md).
 
 pub mod aspect;
 pub mod depth;
@@ -49,14 +49,14 @@ pub use limits::TrackabilityLimits;
 pub use map::{MapProgress, TrackabilityMap};
 pub use pixel::PixelVerdict;
 
-/// How well a target would do.
+/// Rating of a point as a target.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, ToSchema,
 )]
 #[serde(rename_all = "snake_case")]
 #[schema(as = Trackability)]
 pub enum Verdict {
-    /// Nothing speaks against it.
+    /// No criterion is risky or bad.
     #[default]
     Good,
     /// It may be lost.
@@ -66,10 +66,10 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// All of them, the best first.
+    /// All verdicts, the best first.
     pub const ALL: [Self; 3] = [Self::Good, Self::Risky, Self::Bad];
 
-    /// Its word in sentences and tables; records have `bad` for `poor`.
+    /// Name in sentences and tables; records use `bad` instead of `poor`.
     pub const fn word(self) -> &'static str {
         match self {
             Self::Good => "good",
@@ -78,7 +78,7 @@ impl Verdict {
         }
     }
 
-    /// Its word at the beginning of a sentence.
+    /// Name at the beginning of a sentence.
     pub const fn title(self) -> &'static str {
         match self {
             Self::Good => "Good",
@@ -87,7 +87,7 @@ impl Verdict {
         }
     }
 
-    /// Its letter in a map.
+    /// Letter in a map.
     pub const fn letter(self) -> char {
         match self {
             Self::Good => 'g',

@@ -1,7 +1,7 @@
 //! The exact verdict at one pixel: the criteria of the images, and the designation itself.
 //!
-//! *Good* means that the pixel can be designated and that the designation warns of nothing; what the simulator alone
-//! knows (true shadow) is left out, so that recorded and simulated drives are judged alike.
+//! *Good* means that the designation succeeds without a warning. The simulator's ground truth (true shadow) is not used,
+//! so that recorded and simulated drives are rated in the same way.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -14,12 +14,12 @@ use sightline_track::locate::template::warnings::WarningKind;
 use sightline_track::target::Designation;
 use sightline_track::trace::StepTrace;
 
-/// Places that are judged in the search for a good one.
+/// Number of points rated in the search for a good one.
 const SEARCHED: usize = 6000;
-/// Good places that are designated before the search is given up.
+/// Number of good points designated before the search stops.
 const TRIED: usize = 8;
 
-/// What can be said of one pixel.
+/// The rating of one pixel.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct PixelVerdict {
     /// The stop.
@@ -28,26 +28,26 @@ pub struct PixelVerdict {
     pub pixel: Pixel,
     /// The verdict.
     pub verdict: Verdict,
-    /// The one reason; null where it is good.
+    /// The reason for the verdict; null if it is good.
     pub reason: Option<String>,
-    /// What was looked at, with value, unit, limits and source.
+    /// The criteria with value, unit, limits and source.
     pub criteria: Vec<Criterion>,
-    /// The distance from the left camera, m: the designation's, or else dense stereo's.
+    /// Distance from the left camera, m: from the designation, or else from dense stereo.
     pub range_m: Option<f64>,
-    /// 1σ of that distance as the designation knows it, m.
+    /// 1σ of that distance according to the designation, m.
     pub range_sigma_m: Option<f64>,
     /// The score of point stereo.
     pub stereo_score: Option<f64>,
-    /// How far from the pixel its right partner leads back to, px.
+    /// Left–right consistency: distance between the pixel and the match of its right partner, px.
     pub left_right_px: Option<f64>,
-    /// How far one may safely drive to the next stop, m.
+    /// Longest safe step to the next stop, m.
     pub longest_step_m: Option<f64>,
-    /// The nearest pixel that is good, where this one is not.
+    /// The nearest good pixel; null if this one is good.
     pub nearest_good: Option<Pixel>,
 }
 
 impl PixelVerdict {
-    /// Judges a pixel, and looks for a good one near it where it is not good itself.
+    /// Rates a pixel, and searches for a good one near it if it is not good itself.
     pub fn of(stops: &dyn Stops, ground: &Ground, pixel: Pixel) -> Self {
         let mut found = judge(stops, ground, pixel);
         if found.verdict != Verdict::Good {
@@ -81,7 +81,7 @@ fn judge(stops: &dyn Stops, ground: &Ground, pixel: Pixel) -> PixelVerdict {
             let mut refused = without_designation(ground, &seen);
             refused.criteria.insert(0, designation_criterion(Verdict::Bad));
             (refused.verdict, refused.reason) = (Verdict::Bad, Some(error.to_string()));
-            // A reason of the images says more than the sentence of the refusal.
+            // A reason from the images is more specific than the refusal's message.
             if seen.verdict == Verdict::Bad {
                 refused.reason = seen.sentence();
             }
@@ -121,7 +121,7 @@ fn designated(ground: &Ground, seen: &Assessment, first: &StepTrace) -> PixelVer
     found.range_sigma_m = Some(target.covariance_in_rover.symmetric_eigenvalues().max().max(0.0).sqrt());
     found.stereo_score = stereo.map(|stereo| stereo.score);
     found.left_right_px = stereo.and_then(|stereo| stereo.left_right_px);
-    // Where dense stereo had no range, the papers' rule is all that is known of the step.
+    // Without a range from dense stereo only the papers' rule limits the step.
     found.longest_step_m =
         found.longest_step_m.or(Some(ground.limits.step_share * target.initial_distance_m));
     found

@@ -1,13 +1,13 @@
 //! Ranges of a left image by point stereo on a grid, for pairs whose rows cannot be aligned.
 //!
-//! Two freely placed views (`StereoGeometry::Convergent`), such as two pointings of one mast camera, see each other's
-//! centre in or near the picture: no rotation of the cameras makes their rows agree, and dense stereo finds nothing. Each
-//! grid node is matched along its epipolar curve. Its match is *consistent* if it is inside the searched curve and leads
-//! back to the node. A consistent match gives a range if its score reaches `stereo_ncc_min`, or if it reaches
+//! Two freely placed views (`StereoGeometry::Convergent`), such as two pointings of one mast camera, may have the epipole
+//! in or near the image: no rotation of the cameras aligns their rows, and dense stereo finds nothing. Each grid node is
+//! matched along its epipolar curve. Its match is *consistent* if it is inside the searched curve and its reverse match
+//! returns to the node. A consistent match gives a range if its score reaches `stereo_ncc_min`, or if it reaches
 //! `SCORE_FLOOR` and the disparities of its neighbours agree with it: noise lowers the score of a correct match.
 //!
 //! The grid is matched from coarse to fine. The first level searches the whole curve; each later level searches from the
-//! far end to `REACH_PX` beyond the largest disparity of its neighbours. Where no neighbour is consistent, a node of the
+//! far end to `REACH_PX` beyond the largest disparity of its neighbours. Without a consistent neighbour, a node of the
 //! last level is not searched.
 //!
 //! ```text
@@ -17,7 +17,7 @@
 //! |---|---|---|
 //! | B | vector between the camera centres | m |
 //! | r | unit vector along the line of sight | – |
-//! | b | `effective_baseline_m`: the part of the baseline that is seen from the target | m |
+//! | b | `effective_baseline_m`: the component of the baseline across the line of sight | m |
 //! | d | `disparity_px`, in the map of the nodes divided by `SPACING_PX` | px |
 //! | R | range | m |
 //! | Δd | `disparity_error_px` | px |
@@ -37,32 +37,32 @@ use sightline_track::settings::Settings;
 use sightline_track::stages::capture::StereoPair;
 use sightline_vision::stereo::{DisparityMap, Outcome};
 
-/// Pixels between two nodes of the grid; the first is half of that from the image's corner, as the cells of a map.
+/// Spacing of the grid's nodes, px; the first is half of that from the image's corner, like the cells of a map.
 pub(super) const SPACING_PX: u32 = 8;
 
-/// A match that leads back farther from its node is not believed, px.
+/// Largest distance between a node and its reverse match, px.
 const BACK_MAX_PX: f64 = 1.5;
 
-/// Nearest range of the search, baselines: nearer surfaces differ too much between the views, and their part of the
-/// epipolar curve has no bound.
+/// Nearest range of the search, in baselines: nearer surfaces differ too much between the views, and their part of the
+/// epipolar curve is unbounded.
 const RANGE_MIN_BASELINES: f64 = 4.0;
 
-/// Parts of a ray whose images are compared with the borders of the right image.
+/// Intervals of a ray whose projections are tested against the borders of the right image.
 const CURVE_SAMPLES: u32 = 8;
 
-/// Nodes between the nodes of a level, coarse to fine.
+/// Node spacing of each level, coarse to fine, in nodes.
 const STRIDES: [u32; 3] = [4, 2, 1];
 
-/// How far beyond the largest disparity of its neighbours a node is searched, px.
+/// Search margin beyond the largest disparity of a node's neighbours, px.
 const REACH_PX: f64 = 6.0;
 
 /// Lowest score of a consistent match whose neighbours agree.
 const SCORE_FLOOR: f64 = 0.5;
 
-/// Difference of the disparities of neighbouring nodes that agree, px.
+/// Largest difference of the disparities of neighbouring nodes that agree, px.
 const AGREE_PX: f64 = 1.0;
 
-/// Of its eight neighbours, how many must agree with a match below `stereo_ncc_min`.
+/// Smallest number of its eight neighbours that must agree with a match below `stereo_ncc_min`.
 const AGREE_MIN: usize = 3;
 
 /// Ranges on a grid of the left image.
@@ -77,7 +77,7 @@ pub(super) struct PointRanges {
     pub(super) viewpoint: Point3,
 }
 
-/// A match inside the searched curve that leads back to its node.
+/// A match inside the searched curve whose reverse match returns to its node.
 #[derive(Clone, Copy)]
 struct Match {
     disparity_px: f64,
@@ -85,14 +85,14 @@ struct Match {
     point_m: Point3,
 }
 
-/// A node: its match, or why there is none.
+/// A node: its match, or the reason for having none.
 type Node = Result<Match, Outcome>;
 
-/// The grid while it is matched.
+/// The grid during matching.
 struct Grid {
     width: u32,
     height: u32,
-    /// `None` before the level of the node.
+    /// `None` until the node's level is matched.
     nodes: Vec<Option<Node>>,
 }
 
@@ -174,13 +174,13 @@ impl Grid {
         found.map(|found| found.disparity_px).reduce(f64::max)
     }
 
-    /// The outcome of the coarser node beside one whose neighbours have no match.
+    /// The outcome of the nearest coarser node, for a node whose neighbours have no match.
     fn coarser_outcome(&self, [x, y]: [u32; 2]) -> Outcome {
         let beside = self.at(i64::from(x / 2 * 2), i64::from(y / 2 * 2));
         beside.and_then(|node| node.err()).unwrap_or(Outcome::LeftRight)
     }
 
-    /// How many of the eight neighbours agree with the disparity of a match.
+    /// Number of the eight neighbours that agree with the disparity of a match.
     fn agreeing(&self, index: usize, found: &Match) -> usize {
         let width = self.width as usize;
         let (x, y) = ((index % width) as i64, (index / width) as i64);
@@ -189,7 +189,7 @@ impl Grid {
         neighbours.filter(|other| (other.disparity_px - found.disparity_px).abs() <= AGREE_PX).count()
     }
 
-    /// The matches that give a range.
+    /// Keeps the matches that give a range.
     fn ranges(self, score_min: f64, viewpoint: Point3) -> PointRanges {
         let judge = |index: usize, node: &Option<Node>| -> Node {
             let found = node.unwrap_or(Err(Outcome::Outside))?;
@@ -221,7 +221,7 @@ impl Grid {
     }
 }
 
-/// Matches a node, up to `REACH_PX` beyond the largest disparity of its neighbours where it is known.
+/// Matches a node, up to `REACH_PX` beyond the largest disparity of its neighbours if that is known.
 fn matched(input: &StereoInput<'_>, template: &TemplateSettings, neighbours_px: Option<f64>) -> Node {
     let ray = input.left.ray(input.left_pixel).ok_or(Outcome::Outside)?;
     let focal_px = input.left.model.focal_length_px(input.left_pixel).ok_or(Outcome::Outside)?;
@@ -237,13 +237,13 @@ fn matched(input: &StereoInput<'_>, template: &TemplateSettings, neighbours_px: 
     Ok(Match { disparity_px: product / found.range_m, score: found.score, point_m: ray.at(found.range_m) })
 }
 
-/// Whether a part of the ray may be in the right image: most nodes of a pair with little overlap need no search.
+/// Whether a part of the ray may be in the right image: in a pair with little overlap most nodes need no search.
 fn may_be_seen(ray: &Ray, right: &Camera, template: &TemplateSettings) -> bool {
     let far = 1.0 / template.range_max_m;
     let near = 1.0 / template.range_min_m;
     let samples = (0..=CURVE_SAMPLES).map(|k| far + (near - far) * f64::from(k) / f64::from(CURVE_SAMPLES));
     let seen: Vec<Pixel> = samples.filter_map(|inverse| right.project(&ray.at(1.0 / inverse))).collect();
-    // The box of two neighbours contains the nearly straight curve between them.
+    // The bounding box of two neighbouring samples contains the nearly straight curve between them.
     let [width, height] = right.size.map(f64::from);
     seen.windows(2).any(|pair| {
         let (a, b) = (pair[0], pair[1]);
@@ -251,7 +251,7 @@ fn may_be_seen(ray: &Ray, right: &Camera, template: &TemplateSettings) -> bool {
     })
 }
 
-/// The settings of the search at a node: the window of a designation, compared once.
+/// The settings of the search at a node: the window of a designation, matched without refinement.
 fn search_settings(template: &TemplateSettings, baseline_m: f64) -> TemplateSettings {
     let range_min_m = template.range_min_m.max(RANGE_MIN_BASELINES * baseline_m).min(template.range_max_m);
     TemplateSettings { surface_warp: false, focus_px: 0.0, range_min_m, ..template.clone() }
@@ -276,7 +276,7 @@ fn outcome_of(failure: &TemplateFailure) -> Outcome {
     }
 }
 
-/// The part of the baseline that is seen from a target on `ray`, m.
+/// The component of the baseline across the line of sight `ray`, m.
 pub(super) fn effective_baseline_m(ray: &Ray, right: &Camera) -> f64 {
     let baseline = right.model.centre() - ray.origin;
     (baseline - ray.direction * baseline.dot(&ray.direction)).norm()

@@ -1,14 +1,14 @@
-//! What a window's grey values say: noise, light, contrast, the error that a match would have, and whether the same is seen again.
+//! Grey-value criteria of a window: noise, light, contrast, the expected match error, and ambiguity.
 //!
-//! **Expected match.** Two windows that show the same but for noise (2σ_n²) and what a step changes ((1 − ρ²) s²) are
-//! matched by least squares through the Gaussian window w of the refinement:
+//! **Expected match.** Two windows that differ by noise (2σ_n²) and by the change of a step ((1 − ρ²) s²) are matched by
+//! least squares with the Gaussian window w of the refinement:
 //! ```text
 //! A = Σ w g gᵀ,  B = Σ w² g gᵀ,  Σ = (2σ_n² + k (1 − ρ²) s²) A⁻¹ B A⁻¹,     σ = √(largest eigenvalue)
 //! ```
-//! The smaller eigenvalue of A (Shi & Tomasi 1994) is what makes it large: an edge, along which a window slides.
+//! It is large if the smaller eigenvalue of A (Shi & Tomasi 1994) is small: along an edge a window slides.
 //!
-//! **Noise.** σ_n is the median of │I ∗ M│ / (6 · 0.6745) with M the difference of two Laplacians (Immerkær 1996): it sees no
-//! slope and no bend. The median over the image is that of its smoother half, so that texture adds little.
+//! **Noise.** σ_n is the median of │I ∗ M│ / (6 · 0.6745) with M the difference of two Laplacians (Immerkær 1996), which
+//! cancels slope and curvature. The median over the image is dominated by its smoother half, so that texture adds little.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -31,7 +31,7 @@ use sightline_vision::image::{GrayImage, PixelRect, gradient};
 /// Number of pixels whose changes over a step are correlated: three by three.
 const ALIKE: f64 = 9.0;
 
-/// The sensor's noise, 1σ, fraction of full scale; 0 for an image too small to tell.
+/// The sensor's noise, 1σ, fraction of full scale; 0 if the image is too small.
 pub fn noise(image: &GrayImage) -> f64 {
     const MASK: [[f32; 3]; 3] = [[1.0, -2.0, 1.0], [-2.0, 4.0, -2.0], [1.0, -2.0, 1.0]];
     let (width, height) = image.dimensions();
@@ -75,14 +75,14 @@ pub fn match_sigma_px(window: &Patch, noise: f64, step_score: f64, focus: &Focus
     (largest.is_finite() && largest >= 0.0).then(|| largest.sqrt())
 }
 
-/// The best score of the window with another place of the search area; `None` where there is none, or no contrast.
+/// The best score of the window at another position of the search area; `None` without another peak, or without contrast.
 pub fn likeness(image: &GrayImage, pixel: Pixel, window: &Patch, search_px: u32) -> Option<f64> {
     let surface = zncc_surface(window, image, PixelRect::centred(pixel, search_px))?;
     let best = find_peak(&surface, false)?;
     second_peak(&surface, &best, f64::from(window.width()) / 2.0).map(|second| second.score)
 }
 
-/// The share of a window's pixels that `is` holds for.
+/// The fraction of a window's pixels that satisfy `is`.
 pub fn share(window: &Patch, is: impl Fn(f32) -> bool) -> f64 {
     let count = window.iter().filter(|value| is(**value)).count();
     count as f64 / window.as_raw().len().max(1) as f64

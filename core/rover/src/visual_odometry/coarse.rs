@@ -1,17 +1,18 @@
-//! Step `coarse_search`: the translation between two stops, without trusting the wheels.
+//! Step `coarse_search`: the translation between two stops, independent of wheel odometry.
 //!
-//! Wheels that slip predict points hundreds of pixels off, while gyro and accelerometers know the turn. Images are reduced to
-//! about 64 px, where the whole step is a few pixels. There strong points are compared at all places that translations can
-//! put them; a translation scores the mean over the points that it keeps in view,
+//! With wheel slip the predicted points are off by hundreds of pixels, while gyro and accelerometers measure the rotation.
+//! Images are reduced to about 64 px, where the whole step is a few pixels. Strong points are compared at all positions
+//! that translations can give them; a translation scores the mean over the points that it keeps in view,
 //! ```text
-//! d(s, a) = (1 − s) w + a n      s from −0.4 to 1.4, |a| ≤ 0.45 |w| + 5 cm        score(d) = mean_i ncc_i(project(p_i by d))
+//! d(s, a)  = (1 − s) w + a n      s from −0.4 to 1.4, |a| ≤ 0.45 |w| + 5 cm
+//! score(d) = mean_i ncc_i(project(p_i by d))
 //! ```
-//! Where other translations score nearly as well, as along the rover's own tracks, the matches in the whole images decide.
+//! If other translations score nearly as well, as along the rover's own tracks, the matches in the full images decide.
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
-//! | w, n | motion by the wheels, its normal in the level | m, rover frame before |
-//! | s, a | slip along and aside | –, m |
+//! | w, n | motion by the wheels, its horizontal normal | m, rover frame before |
+//! | s, a | slip ratio along the motion, motion aside | –, m |
 //! | p_i | points | m, rover frame before |
 //!
 //! Source: ours.
@@ -28,28 +29,28 @@ use super::reduce::Reduced;
 use super::settings::OdometryScore;
 use super::windows;
 
-/// Width of the images that are compared, px, about.
+/// Approximate width of the compared images, px.
 const WIDTH_PX: u32 = 64;
 /// Half of a window, px.
 const HALF_PX: u32 = 3;
-/// Most points that are compared.
+/// Largest number of compared points.
 const POINTS_MAX: usize = 40;
-/// Slips along the motion that are tried.
+/// Range of slip ratios along the motion.
 pub(super) const SLIPS: [f64; 2] = [-0.4, 1.4];
-/// Movement aside that is tried: as a part of the wheels' motion, and at least, m.
+/// Range of the motion aside: relative to the wheels' motion, and the minimum, m.
 const ASIDE: f64 = 0.45;
 const ASIDE_MIN_M: f64 = 0.05;
-/// How far a near point moves in the image from one translation to the next, px.
+/// Image motion of a near point between neighbouring translations, px.
 const STEP_PX: f64 = 1.0;
-/// Steps between two translations that are different ones.
+/// Smallest distance between distinct translations, in steps.
 const APART_STEPS: f64 = 3.5;
-/// Translations that are kept.
+/// Number of kept translations.
 const KEPT: usize = 3;
-/// Part of the best score from which on another translation is tried as well.
+/// Fraction of the best score from which on another translation is tried as well.
 const NEARLY: f64 = 0.8;
-/// Slips for which the windows are read anew.
+/// Slip ratios for which the windows are resampled.
 const WINDOW_SLIPS: [f64; 3] = [0.0, 0.5, 1.0];
-/// Share of the points that a translation keeps in view, at least.
+/// Smallest fraction of the points that a translation must keep in view.
 const IN_VIEW_MIN: f64 = 0.4;
 
 /// A translation with its score.
@@ -68,21 +69,21 @@ impl From<(Vector3, f64)> for Translation {
     }
 }
 
-/// The outcome of the coarse search.
+/// The result of the coarse search.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[schema(as = OdometryCoarseSearch)]
 pub struct CoarseSearch {
     /// The best translation.
     pub best: Translation,
-    /// The next best ones, each another one, best first.
+    /// The next best distinct translations, best first.
     pub others: Vec<Translation>,
-    /// How many translations were compared.
+    /// Number of compared translations.
     pub translations: u32,
-    /// Distance between two neighbouring ones, m.
+    /// Spacing of neighbouring translations, m.
     pub spacing_m: f64,
 }
 
-/// The translation at which most points look alike; none where fewer than six points can be compared.
+/// Finds the translation with the highest mean score; `None` if fewer than six points can be compared.
 pub(super) fn coarse_search(
     before: &Eyes<'_>,
     after: &Eyes<'_>,
@@ -120,7 +121,7 @@ pub(super) fn coarse_search(
     })
 }
 
-/// The best translations, each at least `apart_m` from those before it.
+/// The best translations, each at least `apart_m` from the previous ones.
 fn apart(mut scored: Vec<(Vector3, f64)>, apart_m: f64) -> [Option<(Vector3, f64)>; KEPT] {
     let mut kept = [None; KEPT];
     for place in &mut kept {
@@ -132,7 +133,7 @@ fn apart(mut scored: Vec<(Vector3, f64)>, apart_m: f64) -> [Option<(Vector3, f64
 }
 
 impl CoarseSearch {
-    /// The motions that the matches decide between, the best first: one with the predicted turn for each translation that scores
+    /// Start motions for the matches, the best first: one with the predicted rotation for each translation that scores
     /// nearly as well as the best.
     pub(super) fn starts(&self, predicted_after_from_before: &Pose) -> Vec<Pose> {
         let turn = predicted_after_from_before.inverse().rotation;
@@ -149,7 +150,7 @@ fn focal_px(reduced: &Reduced) -> Option<f64> {
     reduced.camera.model.focal_length_px(reduced.camera.centre_pixel())
 }
 
-/// The displacements that are tried.
+/// The displacements of the search.
 struct Grid {
     wheels: Vector3,
     aside: Vector3,
@@ -166,7 +167,7 @@ impl Grid {
     }
 
     fn displacements(&self) -> impl Iterator<Item = Vector3> + '_ {
-        // Wheels that hardly moved may have slid all the same.
+        // Wheels that hardly moved may have slid nevertheless.
         let level = Vector3::new(self.wheels.x, self.wheels.y, 0.0);
         let length_m = level.norm().max(ASIDE_MIN_M);
         let along = level.try_normalize(1e-6).unwrap_or_else(Vector3::x);
@@ -185,7 +186,7 @@ impl Grid {
     }
 }
 
-/// The score maps of the points that are compared.
+/// The score maps of the compared points.
 struct Maps {
     points: Vec<(Point3, Vec<Surface>)>,
 }
@@ -203,7 +204,7 @@ impl Maps {
         Self { points: maps.collect() }
     }
 
-    /// The range below which a quarter of the points are, m.
+    /// The first quartile of the points' ranges, m.
     fn near_m(&self, before: &Reduced) -> f64 {
         let centre = before.camera.model.centre();
         let mut ranges: Vec<f64> = self.points.iter().map(|(point, _)| (point - centre).norm()).collect();
@@ -211,7 +212,7 @@ impl Maps {
         ranges[ranges.len() / 4]
     }
 
-    /// The mean score of the points in view under a motion; none where too few are.
+    /// Mean score of the points in view under a motion; `None` if too few are in view.
     fn score(&self, after_from_before: &Pose, after: &Reduced) -> Option<f64> {
         let (mut sum, mut count) = (0.0, 0usize);
         for (point, surfaces) in &self.points {
@@ -230,7 +231,7 @@ impl Maps {
     }
 }
 
-/// The scores of one point's window, read as after a motion, in the whole image.
+/// Score map of one point's window, resampled for a motion, over the whole image.
 fn surface(before: &Reduced, after: &Reduced, point: &Point, pixel: Pixel, motion: &Pose) -> Option<Surface> {
     let normal = ground_normal();
     let (from, to) = (&before.camera, &after.camera);

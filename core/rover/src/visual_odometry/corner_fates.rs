@@ -1,4 +1,4 @@
-//! What became of the corners while the matches are searched for.
+//! The fates of the corners during the search for matches.
 
 use sightline_geometry::frames::Pixel;
 
@@ -7,7 +7,7 @@ use super::motion::{self, Fitted};
 use super::outcome::{Fate, OdometryCorner};
 use super::points::{NoPoint, Point};
 
-/// What became of the corners so far.
+/// The fates of the corners so far.
 pub(super) struct CornerFates {
     corners: Vec<Pixel>,
     fates: Vec<Fate>,
@@ -31,12 +31,12 @@ impl CornerFates {
         }
     }
 
-    /// How many there are.
+    /// Number of corners.
     pub(super) fn count(&self) -> usize {
         self.corners.len()
     }
 
-    /// Notes that a corner has no point.
+    /// Records that a corner has no point.
     pub(super) fn without_point(&mut self, corner: usize, reason: NoPoint) {
         self.fates[corner] = match reason {
             NoPoint::Outside | NoPoint::LowScore => Fate::NoStereo,
@@ -44,7 +44,7 @@ impl CornerFates {
         };
     }
 
-    /// Notes that a corner's point has no match.
+    /// Records that a corner's point has no match.
     pub(super) fn without_match(&mut self, corner: usize, reason: NoMatch) {
         self.fates[corner] = match reason {
             NoMatch::OutOfView => Fate::OutOfView,

@@ -1,15 +1,15 @@
-//! The gates of an odometry update: a value that fails its limit makes "no update".
+//! The gates of an odometry update: a value beyond its limit rejects the update.
 //!
 //! | gate | value | source |
 //! |---|---|---|
-//! | `odometry_inliers` | matches that agree with the motion | domain.md 9.2, step 8 |
-//! | `odometry_inlier_share` | their share of all matches | ours |
+//! | `odometry_inliers` | inliers of the motion | domain.md 9.2, step 8 |
+//! | `odometry_inlier_share` | inliers over all matches | ours |
 //! | `odometry_chi2` | χ² per degree of freedom of the residuals | domain.md 9.2, step 8 |
 //! | `odometry_sigma_m` | largest 1σ axis of the translation | ours |
-//! | `odometry_translation_m` | distance from the translation of the wheels | domain.md 9.2, step 8 |
-//! | `odometry_attitude_deg` | angle from the turn of gyro and accelerometers | domain.md 9.2, step 8 |
-//! | `odometry_ambiguity` | inliers of another motion as a part of those of the best | ours |
-//! | `odometry_repetition` | how well another way along the motion fits, as a part of how well the motion fits | ours |
+//! | `odometry_translation_m` | distance from the translation by wheel odometry | domain.md 9.2, step 8 |
+//! | `odometry_attitude_deg` | angle from the rotation by gyro and accelerometers | domain.md 9.2, step 8 |
+//! | `odometry_ambiguity` | inliers of another motion over those of the best | ours |
+//! | `odometry_repetition` | score of another displacement along the motion over that of the motion | ours |
 //!
 //! Numbers continue those of the trackers (`locate::gate_kinds`).
 
@@ -21,7 +21,7 @@ use sightline_track::gate::{Gate, GateKind, Side, Unit};
 use super::motion::Fitted;
 use super::settings::OdometrySettings;
 
-/// Distance between the translations of vision and wheels that is allowed whatever the step, m.
+/// Minimum of the allowed distance between the translations by vision and by wheels, m.
 const TRANSLATION_MIN_M: f64 = 0.05;
 
 const fn kind(number: u8, name: &'static str, label: &'static str, unit: Unit, side: Side) -> GateKind {
@@ -39,16 +39,16 @@ const ATTITUDE: GateKind =
 const AMBIGUITY: GateKind = kind(46, "odometry_ambiguity", "ambiguity", Unit::One, Side::AtMost);
 const REPETITION: GateKind = kind(47, "odometry_repetition", "repetition", Unit::One, Side::AtMost);
 
-/// All gates, in the order in which they are judged.
+/// All gates, in order of evaluation.
 pub(super) static KINDS: [GateKind; 8] =
     [INLIERS, INLIER_SHARE, CHI2, SIGMA, TRANSLATION, ATTITUDE, AMBIGUITY, REPETITION];
 
-/// All gates of an update, for those who name them.
+/// All gates of an update, with names and labels.
 pub fn gate_kinds() -> &'static [GateKind] {
     &KINDS
 }
 
-/// What is judged.
+/// Inputs of the gates.
 pub(super) struct Judged<'a> {
     pub(super) predicted: &'a Pose,
     pub(super) fitted: Option<&'a Fitted>,
@@ -58,7 +58,7 @@ pub(super) struct Judged<'a> {
     pub(super) repetition: f64,
 }
 
-/// All gates; those of a motion that does not exist have no value and fail.
+/// Evaluates all gates; without a motion they have no value and fail.
 pub(super) fn judge(judged: &Judged<'_>, settings: &OdometrySettings) -> Vec<Gate> {
     let Judged { predicted, fitted, covariance, matches, ambiguity, repetition } = judged;
     let named = |kind: GateKind, setting: &'static str, value: Option<f64>, limit: f64| {

@@ -1,10 +1,10 @@
-//! Where the mast points for odometry: at the ground ahead, and in turns half way back to the view before.
+//! Mast pointing for odometry: at the ground ahead, and in turns half way back to the previous view.
 //!
 //! ```text
 //! azimuth = ½ (azimuth before − turn)
 //! ```
-//! A view straight ahead keeps at least 60 % of the ground in steps of 0.75 m; a turn of 18° of a field of 45° does so only
-//! where the mast gives way (domain.md 9.2: at least 60 % of overlap). Frame: rover. Source: ours.
+//! A view straight ahead keeps at least 60 % of the ground in steps of 0.75 m; a turn of 18° with a field of view of 45°
+//! does so only if the mast compensates half of it (domain.md 9.2: at least 60 % of overlap). Frame: rover. Source: ours.
 
 use std::f64::consts::{PI, TAU};
 
@@ -14,8 +14,8 @@ use sightline_geometry::frames::{Point3, Pose};
 /// Horizontal distance of the ground at the centre of the view from the mast, m.
 const AHEAD_M: f64 = 3.0;
 
-/// The angles for the pair after a motion by wheels and gyro; `before` is the azimuth of the pair before, which shall be seen
-/// again. `None` where the mast cannot point there.
+/// The mast angles for the pair after a motion by wheels and gyro. `before` is the azimuth of the previous pair, whose
+/// view must overlap. `None` if the mast cannot point there.
 pub fn look(mast: &Mast, before: Option<f64>, predicted_after_from_before: &Pose) -> Option<MastAngles> {
     let turn_rad = predicted_after_from_before.inverse().rotation.euler_angles().2;
     let azimuth_rad = before.map_or(0.0, |before| 0.5 * (before - turn_rad));
@@ -25,7 +25,7 @@ pub fn look(mast: &Mast, before: Option<f64>, predicted_after_from_before: &Pose
     mast.point_left_centre_at(&ground)
 }
 
-/// The same looking back, at the rover's own tracks (R142).
+/// The same backwards, at the rover's own tracks (R142).
 pub(crate) fn look_back(
     mast: &Mast,
     before: Option<f64>,
@@ -57,10 +57,10 @@ mod tests {
         };
         let ahead = look(&mast, None, &Pose::identity()).unwrap();
         assert!(ahead.azimuth_rad.abs() < 0.05 && ahead.elevation_rad < -0.2, "{ahead:?}");
-        // To the right by 18°: the view before is 18° to the left, the new one 9°.
+        // To the right by 18°: the previous view is 18° to the left, the new one 9°.
         let right = look(&mast, Some(0.0), &turned(18.0)).unwrap();
         assert!((right.azimuth_rad - ahead.azimuth_rad + 9f64.to_radians()).abs() < 0.01, "{right:?}");
-        // Back, too, and the view before wherever the mast counts its angle from.
+        // Also backwards, with the previous azimuth in any revolution.
         for turns in [-TAU, 0.0, TAU] {
             let back = look_back(&mast, Some(PI + turns), &turned(18.0)).unwrap();
             assert!((back.azimuth_rad - right.azimuth_rad - PI).abs() < 0.01, "{back:?}");

@@ -1,8 +1,8 @@
-//! Step `match`: the points of the stop before in the images of the stop after.
+//! Step `match`: finds the points of the previous stop in the images of the current one.
 //!
-//! A point is predicted by the motion known so far and looked for in the left image; its window is read as it appears from
-//! there. The match between the eyes after the motion then gives its position there. The search runs twice: around the first
-//! prediction, and a few pixels around that of the motion that fits the first matches, whose windows are the right ones.
+//! A point is predicted by the motion known so far and searched in the left image; its window is resampled as it appears
+//! from there. The stereo match after the motion then gives its position there. The search runs twice: around the first
+//! prediction, and within a few pixels of that of the motion fitted to the first matches, with windows resampled for it.
 
 use nalgebra::Matrix2;
 
@@ -13,36 +13,36 @@ use super::points::{Eyes, NoPoint, Point, ground_normal, point_near};
 use super::settings::OdometrySettings;
 use super::windows;
 
-/// How far beyond the search between the stops the match between the eyes may be from its prediction, px.
+/// Search margin of the stereo match beyond that of the match between the stops, px.
 const STEREO_MARGIN_PX: f64 = 2.0;
 
 /// A point at both stops.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Match {
-    /// Number of the point.
+    /// Index of the point.
     pub(super) point: usize,
     /// In the left image after, px.
     pub(super) left: Pixel,
-    /// Change of the view: how far the map of the window is from the identity, px per px.
+    /// Change of the view: deviation of the window's affine map from the identity, px per px.
     pub(super) change: f64,
     /// The positions with their covariances.
     pub(super) pair: Correspondence,
-    /// Movement of the position after by a common shift of the matches, m per px.
+    /// Derivative of the position after the motion with respect to a common shift of the matches, m per px.
     pub(super) by_shift: [Vector3; 3],
 }
 
 /// Why a point has no match.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum NoMatch {
-    /// It is predicted outside the image after, or too near to its border.
+    /// Its prediction is outside the image after the motion, or too near to its border.
     OutOfView,
     /// No match between the stops is good enough.
     LowScore,
-    /// No match between the eyes after the motion.
+    /// No stereo match after the motion.
     NoStereo,
 }
 
-/// The match of a point up to `reach_px` around its prediction by a motion.
+/// The match of a point within `reach_px` of its prediction by a motion.
 pub(super) fn find(
     [before, after]: [&Eyes<'_>; 2],
     (number, point): (usize, &Point),

@@ -1,4 +1,4 @@
-//! The motion to a stop as vision measured it, with what the wheels had to say: the result that a stop keeps.
+//! Visual odometry's measurement of the motion to a stop, with the wheels' prediction: the result stored with a stop.
 
 use nalgebra::Matrix6;
 use serde::{Deserialize, Serialize};
@@ -15,42 +15,42 @@ use super::{OdometryInput, OdometryPreset, OdometryUpdate, OdometryView, update}
 use crate::pair::{self, StopPair};
 use crate::pipeline::Stops;
 
-/// What visual odometry is used for.
+/// Use of visual odometry.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum OdometryMode {
-    /// It does not run: the pose is that of wheels, gyro and accelerometers (R10).
+    /// Off: the pose is that of wheels, gyro and accelerometers (R10).
     Off,
-    /// It measures the slip, which may end the drive; the pose is that of wheels, gyro and accelerometers.
+    /// Measures the slip, which may end the drive; the pose is that of wheels, gyro and accelerometers.
     SlipCheck,
     /// Accepted updates correct the pose as well (R11).
     #[default]
     Full,
 }
 
-/// The motion to a stop as vision measured it.
+/// Visual odometry's measurement of the motion to a stop.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeasuredMotion {
-    /// The settings.
+    /// Preset of the settings.
     pub preset: OdometryPreset,
-    /// The pose by wheels, gyro and accelerometers, from the estimated pose of the stop before; site frame.
+    /// The pose by wheels, gyro and accelerometers, from the estimated pose of the previous stop; site frame.
     pub wheels_site_from_rover: PoseRecord,
-    /// Whether the estimated pose of the stop is by this motion, and its error that of this motion.
+    /// Whether the estimated pose of the stop, and its error, are those of this motion.
     pub corrects: bool,
-    /// The pair of both stops in which it was measured; null: the main one.
+    /// The pair of both stops that was used; null for the main one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<CameraName>,
     /// The motion with its gates.
     pub update: OdometryUpdate,
-    /// Why it was refused in the other pair, where two were tried.
+    /// Why it was refused in the other pair, if two were tried.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub refused_too: Option<String>,
 }
 
 impl MeasuredMotion {
-    /// Measures the motion to stop `step` from the main pairs there and at the stop before, or from further pairs. The estimated
-    /// pose of the stop is that of wheels, gyro and accelerometers.
+    /// Measures the motion to stop `step` from the main pairs there and at the previous stop, or from further pairs. The
+    /// estimated pose of the stop must be that of wheels, gyro and accelerometers.
     ///
     /// # Errors
     /// A stop without such a pair, images that cannot be read, or [`sightline_geometry::error::Error::Cancelled`].
@@ -69,7 +69,7 @@ impl MeasuredMotion {
         Ok(Self { preset, wheels_site_from_rover, corrects, camera, update, refused_too: None })
     }
 
-    /// The same update once more, with its corners, which no stop keeps.
+    /// Repeats the update to obtain its corners, which are not stored.
     ///
     /// # Errors
     /// As [`Self::measure`].
@@ -77,7 +77,7 @@ impl MeasuredMotion {
         between(stops, (step, self.camera), &self.wheels_site_from_rover.to_pose(), self.preset, cancel)
     }
 
-    /// The estimated pose of the stop, where that of the stop before is `before`; both site frame.
+    /// The estimated pose of the stop for the estimated pose `before` of the previous one; both site frame.
     pub fn pose_after(&self, before: &Pose) -> Pose {
         let accepted = self.update.accepted_motion().filter(|_| self.corrects);
         accepted.map_or_else(|| self.wheels_site_from_rover.to_pose(), |motion| before * motion.inverse())
@@ -90,10 +90,10 @@ impl MeasuredMotion {
         Some(too.map_or_else(|| refusal.clone(), |too| format!("{refusal}; looking back, {too}")))
     }
 
-    /// Refuses implausible values, as a file may have them.
+    /// Rejects implausible values, which a file may contain.
     ///
     /// # Errors
-    /// A sentence that begins with the field.
+    /// A message that begins with the field.
     pub fn check(&self) -> Result<(), String> {
         let motion = self.update.after_from_before;
         if !(self.wheels_site_from_rover.is_plausible() && motion.is_none_or(|motion| motion.is_plausible()))
@@ -117,33 +117,33 @@ impl MeasuredMotion {
         Ok(())
     }
 
-    /// Updates that were computed.
+    /// Number of computed updates.
     pub fn updates(&self) -> u32 {
         1 + u32::from(self.refused_too.is_some())
     }
 
-    /// Pairs that vision took of its own: the one in which it measured, and the one that looks back after a refusal.
+    /// Number of additional pairs: the one of the measurement, and the one that looks back after a refusal.
     pub(crate) fn own_pairs(&self) -> u32 {
         u32::from(self.camera.is_some()) + u32::from(!self.update.accepted)
     }
 
-    /// Movement of the rover's origin by vision, rover frame of the stop before, m.
+    /// Displacement of the rover's origin by vision, rover frame of the previous stop, m.
     fn displacement(&self) -> Option<Vector3> {
         Some(self.update.after_from_before?.to_pose().inverse().translation.vector)
     }
 
-    /// Distance between the places by vision and by wheels, m.
+    /// Distance between the positions by vision and by wheels, m.
     fn wheels_apart_m(&self) -> Option<f64> {
         Some((self.displacement()? - Vector3::from(self.update.wheels_m)).norm())
     }
 
-    /// The covariance of the pose change, where it is by vision.
+    /// The covariance of the pose change, if the pose is by vision.
     fn covariance(&self) -> Option<Matrix6<f64>> {
         self.update.covariance.filter(|_| self.corrects)
     }
 }
 
-/// The error of the pose change from the stop before to stop `step`.
+/// The error model of the pose change from the previous stop to stop `step`.
 pub(crate) fn pose_change_error(stops: &dyn Stops, step: usize) -> PoseChangeError {
     let measured = stops.measured_motion(step).and_then(MeasuredMotion::covariance);
     measured.map_or_else(
@@ -224,7 +224,7 @@ fn worst_sigma_m(covariance: &Matrix6<f64>) -> f64 {
     covariance.fixed_view::<3, 3>(0, 0).into_owned().symmetric_eigenvalues().max().max(0.0).sqrt()
 }
 
-/// A motion straight ahead that was accepted.
+/// An accepted motion straight ahead.
 #[cfg(test)]
 pub(crate) fn accepted() -> MeasuredMotion {
     let pose = PoseRecord::from(&Pose::identity());

@@ -1,19 +1,20 @@
-//! Visual odometry: the motion between two stops from their stereo pairs, or "no update" with its reason (R10, R11, R38, R126).
+//! Visual odometry: the motion between two stops from their stereo pairs, or a refusal with its reason (R10, R11, R38,
+//! R126).
 //!
 //! ```text
 //! points → coarse_search → match → consistent_set → fit_motion → gates
 //! ```
-//! Corners of the left image before become points by stereo. A search over translations in coarse images puts up with wheels
-//! that slip. The points are matched in both images after, those that keep their distances agree on a motion, and their full
-//! covariances give the motion of most likelihood. Gates refuse what is not certain: the estimate of wheels and gyro stays,
-//! and the reason says which gate failed, with value and margin.
+//! Corners of the left image before the motion become points by stereo. A search over translations in coarse images
+//! tolerates wheel slip. The points are matched in both images after the motion, the matches with constant mutual
+//! distances give a motion, and their full covariances its maximum-likelihood estimate. Gates reject uncertain results:
+//! the estimate of wheels and gyro remains, and the reason names the failed gate with value and margin.
 //!
-//! The update is a function of two stereo pairs, their cameras and the motion by wheels and gyro. It knows no target.
+//! The update is a function of two stereo pairs, their cameras and the motion by wheels and gyro. It uses no target.
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
 //! | T | `after_from_before` | m; from the rover frame before to that after |
-//! | Σ | `covariance` of a small motion (τ, ω) about the rover's origin that follows T | m², m rad, rad²; rover frame after |
+//! | Σ | `covariance` of a small motion (τ, ω) about the rover's origin after T | m², m rad, rad²; rover frame after |
 //!
 //! Sources: Maimone, Cheng & Matthies 2007; Howard 2008; domain.md 9.
 
@@ -60,9 +61,9 @@ use self::windows::Eye;
 
 /// Half the side of the second search window, px.
 const SECOND_REACH_PX: u32 = 3;
-/// Translations farther apart than this are those of two motions, m.
+/// Smallest distance between the translations of distinct motions, m.
 const OTHER_MOTION_M: f64 = 0.015;
-/// Wheels that moved less than this have no slip, m.
+/// Smallest motion of the wheels with a defined slip ratio, m.
 const SLIP_MIN_M: f64 = 0.02;
 
 /// The stereo pair of a stop with its cameras.
@@ -74,11 +75,11 @@ pub struct OdometryView<'a> {
     pub left: &'a Camera,
     /// The right camera.
     pub right: &'a Camera,
-    /// The angles of the mast that carries them; `None` for cameras on the body and where they are unknown.
+    /// The mast angles of the cameras; `None` for cameras on the body, or if unknown.
     pub mast_angles: Option<MastAngles>,
 }
 
-/// What an update is made from.
+/// Inputs of an update.
 #[derive(Clone, Copy)]
 pub struct OdometryInput<'a> {
     /// The stop before.
@@ -91,11 +92,11 @@ pub struct OdometryInput<'a> {
     pub mast: Option<(&'a Mast, f64)>,
     /// The settings.
     pub settings: &'a OdometrySettings,
-    /// Whether to stop early.
+    /// Request to stop early.
     pub cancel: Cancel<'a>,
 }
 
-/// The motion between two stops.
+/// Computes the motion between two stops.
 ///
 /// # Errors
 /// [`sightline_geometry::error::Error::Cancelled`].
@@ -145,7 +146,7 @@ pub fn update(input: &OdometryInput<'_>) -> Result<OdometryUpdate> {
     Ok(outcome(input, fates, points.len(), coarse, [ambiguity, repetition], best))
 }
 
-/// Matches around one start, and the motion that they agree on.
+/// Matches around one start, and the motion fitted to them.
 struct Refined {
     matches: Vec<Match>,
     lost: Vec<(usize, NoMatch)>,
@@ -158,7 +159,7 @@ impl Refined {
     }
 }
 
-/// The search for matches in the whole images.
+/// The search for matches in the full images.
 struct Search<'a> {
     eyes: [&'a Eyes<'a>; 2],
     points: &'a [Point],
@@ -191,7 +192,7 @@ impl Search<'_> {
     }
 }
 
-/// The result with most inliers, of equal ones the first; and the inliers of the best other motion as a part of its own.
+/// The result with most inliers (the first of equal ones), and the inliers of the best other motion relative to its own.
 fn chosen(found: Vec<Refined>) -> (Refined, f64) {
     let mut found = found.into_iter();
     let nothing =
@@ -216,7 +217,7 @@ fn chosen(found: Vec<Refined>) -> (Refined, f64) {
     (best, ambiguity)
 }
 
-/// The outcome of what was found.
+/// Assembles the outcome from the results.
 fn outcome(
     input: &OdometryInput<'_>,
     fates: CornerFates,
@@ -265,7 +266,7 @@ fn outcome(
     }
 }
 
-/// The whole covariance of a motion.
+/// The complete covariance of a motion.
 fn covariance(input: &OdometryInput<'_>, fitted: &Fitted, matches: &[Match]) -> Matrix6<f64> {
     let [always_px, by_change_px] = input.settings.common_px;
     let common_px = always_px.hypot(by_change_px * fitted.change(matches));
@@ -277,7 +278,7 @@ fn covariance(input: &OdometryInput<'_>, fitted: &Fitted, matches: &[Match]) -> 
     fitted.covariance + common + mast
 }
 
-/// The slip by a motion against the motion of the wheels.
+/// The slip ratio of a motion relative to that of the wheels.
 fn slip(motion: &Pose, covariance: &Matrix6<f64>, predicted: &Pose) -> Option<Slip> {
     let (wheels, seen) = (predicted.inverse().translation.vector, motion.inverse().translation.vector);
     let length_m = wheels.norm();
@@ -296,7 +297,7 @@ fn slip(motion: &Pose, covariance: &Matrix6<f64>, predicted: &Pose) -> Option<Sl
     })
 }
 
-/// The images of both stops as they are compared.
+/// The preprocessed images of both stops.
 struct Stops {
     eyes: [[Reduced; 2]; 2],
     factor: u32,

@@ -1,19 +1,19 @@
-//! Step `fit_motion`: the motion of most likelihood of the matches that agree, and its covariance.
+//! Step `fit_motion`: the maximum-likelihood motion of the inliers, and its covariance.
 //!
-//! The consistent set gives a first motion; the matches within `outlier_sigma` of it are fitted with their full covariances
-//! (`estimate::weighted_motion`), again until they stay the same. To the covariance of the fit, times χ²/dof where that is
-//! above 1, come two errors that all matches share: a common shift of the matches by `common_px`, and the error of the mast's
-//! angles at both stops.
+//! The consistent set gives a first motion; the matches within `outlier_sigma` of it are fitted with their full
+//! covariances (`estimate::weighted_motion`), until the inliers stay the same. Two errors common to all matches are added
+//! to the covariance of the fit (multiplied by χ²/dof if that is above 1): a common shift of the matches by `common_px`,
+//! and the error of the mast's angles at both stops.
 //! ```text
 //! Σ = max(1, χ²/dof) H⁻¹ + σ_c² Σ_k s_k s_kᵀ + Σ_stops σ_m² (a aᵀ + e eᵀ)
 //! s_k = H⁻¹ Σ_i A_iᵀ W_i ∂q_i/∂k          k: shift along x, along y, of the disparity
 //! ```
-//! All are covariances of a small motion (τ, ω) about the rover's origin that follows the motion.
+//! All are covariances of a small motion (τ, ω) about the rover's origin, applied after the motion.
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
-//! | τ, ω | small translation and turn | m, rad; rover frame after |
-//! | a, e | small motion by 1 rad of the mast's azimuth and elevation | m per rad, – |
+//! | τ, ω | small translation and rotation | m, rad; rover frame after |
+//! | a, e | small motion per 1 rad of the mast's azimuth and elevation | m per rad, – |
 //!
 //! Sources: domain.md 9.2, steps 6 to 8; the shared errors are ours.
 
@@ -30,35 +30,35 @@ use super::matches::Match;
 use super::rigidity::consistent_set;
 use super::settings::{ConsistentSet, OdometrySettings};
 
-/// Most fits to the matches that agree.
+/// Largest number of fits to the inliers.
 const FITS_MAX: usize = 10;
 
-/// A motion with the matches that agree with it.
+/// A motion with its inliers.
 #[derive(Clone, Debug)]
 pub(super) struct Fitted {
     pub(super) after_from_before: Pose,
-    /// Numbers of the matches that agree.
+    /// Indices of the inliers.
     pub(super) inliers: Vec<usize>,
     /// Size of the consistent set from which the fit began.
     pub(super) consistent: usize,
-    /// Covariance of a small motion (τ, ω) about the rover's origin, without the errors that all matches share.
+    /// Covariance of a small motion (τ, ω) about the rover's origin, without the errors common to all matches.
     pub(super) covariance: Matrix6<f64>,
     /// Squared residuals over their variances, per degree of freedom.
     pub(super) chi2_per_dof: f64,
 }
 
 impl Fitted {
-    /// Mean change of the view over the matches that agree.
+    /// Mean change of the view over the inliers.
     pub(super) fn change(&self, matches: &[Match]) -> f64 {
         let sum: f64 = self.inliers.iter().map(|&i| matches[i].change).sum();
         sum / self.inliers.len().max(1) as f64
     }
 }
 
-/// The motion that most matches agree with.
+/// Fits the motion with the most inliers.
 ///
 /// # Errors
-/// A sentence saying why there is none.
+/// A message that says why there is none.
 pub(super) fn fit(matches: &[Match], settings: &OdometrySettings) -> Result<Fitted, String> {
     let pairs: Vec<Correspondence> = matches.iter().map(|found| found.pair).collect();
     let first = match settings.consistent_set {
@@ -103,7 +103,7 @@ pub(super) fn fit(matches: &[Match], settings: &OdometrySettings) -> Result<Fitt
     Ok(Fitted { after_from_before: motion.after_from_before, inliers, consistent, covariance, chi2_per_dof })
 }
 
-/// The matches that agree with a motion of three drawn ones.
+/// The inliers of a RANSAC hypothesis from a minimal sample of three.
 fn drawn(pairs: &[Correspondence], settings: &OdometrySettings) -> Result<Vec<usize>, String> {
     let ransac = RansacSettings {
         draws: 50,
@@ -126,15 +126,15 @@ pub(super) fn squared_distance(pair: &Correspondence, motion: &Pose) -> Option<f
     Some(residual.dot(&solved))
 }
 
-/// The covariance of a small motion about the rover's origin from that about another point: `τ₀ = τ + c × ω`.
+/// Moves the reference point of a covariance of a small motion to the rover's origin: `τ₀ = τ + c × ω`.
 fn about_origin(motion: &UncertainMotion) -> Matrix6<f64> {
     let mut to_origin = Matrix6::identity();
     to_origin.fixed_view_mut::<3, 3>(0, 3).copy_from(&motion.about.coords.cross_matrix());
     to_origin * motion.covariance * to_origin.transpose()
 }
 
-/// What a common shift of all matches by a pixel does to the motion, as covariance of a small motion about the rover's origin,
-/// per px².
+/// Effect of a common shift of all matches by one pixel, as covariance of a small motion about the rover's origin, per
+/// px².
 pub(super) fn by_common_shift(matches: &[Match], fitted: &Fitted) -> Matrix6<f64> {
     let rotation = fitted.after_from_before.rotation.to_rotation_matrix();
     let mut information = Matrix6::zeros();
@@ -156,7 +156,7 @@ pub(super) fn by_common_shift(matches: &[Match], fitted: &Fitted) -> Matrix6<f64
     pulls.iter().map(|pull| factor.solve(pull)).map(|shift| shift * shift.transpose()).sum()
 }
 
-/// The covariance of a small motion about the rover's origin by an error of 1 rad of each mast angle at both stops.
+/// The covariance of a small motion about the rover's origin for an error of 1 rad of each mast angle at both stops.
 pub(super) fn by_mast(
     mast: &Mast,
     [before, after]: [MastAngles; 2],

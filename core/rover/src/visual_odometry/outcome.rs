@@ -1,4 +1,4 @@
-//! The outcome of an update: the motion with its covariance and gates, and what became of every corner.
+//! The outcome of an update: the motion with its covariance and gates, and the fate of every corner.
 
 use nalgebra::SMatrix;
 use serde::{Deserialize, Serialize};
@@ -9,15 +9,15 @@ use sightline_track::gate::Gate;
 
 use super::coarse::CoarseSearch;
 
-/// What became of a corner.
+/// Fate of a corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Fate {
-    /// It agrees with the motion.
+    /// Inlier of the motion.
     Inlier,
-    /// It does not agree with the motion.
+    /// Outlier of the motion.
     Outlier,
-    /// No match between the eyes before the motion.
+    /// No stereo match before the motion.
     NoStereo,
     /// Its range is beyond the limits.
     OutOfRange,
@@ -25,13 +25,13 @@ pub enum Fate {
     OutOfView,
     /// No match between the stops.
     NoMatch,
-    /// No match between the eyes after the motion.
+    /// No stereo match after the motion.
     NoStereoAfter,
-    /// There is no motion to agree with.
+    /// No motion to compare with.
     Unused,
 }
 
-/// A corner with what became of it.
+/// A corner with its fate.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct OdometryCorner {
     /// In the left image before, px of the whole image.
@@ -43,7 +43,7 @@ pub struct OdometryCorner {
     pub range_m: Option<f64>,
     /// Residual under the motion in standard deviations; null without match or motion.
     pub residual_sigmas: Option<f64>,
-    /// What became of it.
+    /// Fate of the corner.
     pub fate: Fate,
 }
 
@@ -51,9 +51,9 @@ pub struct OdometryCorner {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[schema(as = OdometrySlip)]
 pub struct Slip {
-    /// Part of the wheels' motion that was lost along it: 1 = the rover stayed.
+    /// Lost fraction of the wheels' motion, along it: 1 = the rover stayed.
     pub along: f64,
-    /// Movement to the right of the motion, as a part of it.
+    /// Motion to the right of the wheels' motion, relative to it.
     pub aside: f64,
     /// 1σ error of `along`.
     pub along_sigma: f64,
@@ -68,29 +68,30 @@ pub struct OdometryUpdate {
     pub points: usize,
     /// Points matched in both images after.
     pub matches: usize,
-    /// Matches that keep their distances from each other.
+    /// Matches with constant mutual distances.
     pub consistent: usize,
-    /// Matches that agree with the motion.
+    /// Inliers of the motion.
     pub inliers: usize,
-    /// The search over translations; null where it is switched off or had too few points.
+    /// The search over translations; null if it is switched off or had too few points.
     pub coarse_search: Option<CoarseSearch>,
-    /// The motion, accepted or not: from the rover frame before to that after; null where none was found.
+    /// The motion, accepted or not, from the rover frame before to that after; null if none was found.
     pub after_from_before: Option<PoseRecord>,
-    /// Movement of the rover's origin by the wheels, rover frame before, m.
+    /// Displacement of the rover's origin by the wheels, rover frame before, m.
     pub wheels_m: [f64; 3],
-    /// Covariance of a small motion (translation in m, turn in rad) about the rover's origin that follows it, rover frame after.
+    /// Covariance of a small motion (translation in m, rotation in rad) about the rover's origin, applied after it, rover
+    /// frame after.
     #[schema(value_type = Option<Vec<f64>>)]
     pub covariance: Option<SMatrix<f64, 6, 6>>,
     /// χ² per degree of freedom of the residuals.
     pub chi2_per_dof: Option<f64>,
-    /// Mean change of the view over the matches that agree: 0.1 where windows grow by a tenth.
+    /// Mean change of the view over the inliers: 0.1 if windows grow by a tenth.
     pub change: Option<f64>,
-    /// The slip by this motion; null without a motion, and where the wheels hardly moved.
+    /// The slip of this motion; null without a motion, and if the wheels hardly moved.
     pub slip: Option<Slip>,
-    /// Inliers of another motion, from another start of the coarse search, as a part of those of the motion; 0 without one.
+    /// Inliers of another motion, from another start of the coarse search, relative to those of the motion; 0 without one.
     pub ambiguity: f64,
-    /// How well another way along the motion of the wheels fits, as a part of how well the motion fits; near 1 where the ground
-    /// repeats itself.
+    /// Score of another displacement along the motion of the wheels, relative to that of the motion; near 1 on ground with
+    /// a repetitive pattern.
     #[serde(default)]
     pub repetition: f64,
     /// The gates.

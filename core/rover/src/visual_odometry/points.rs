@@ -1,11 +1,11 @@
 //! Step `points`: corners of the left image with their positions by stereo.
 //!
-//! The window of the left image is looked for along its epipolar line in the right one, read as on a plane that is parallel to
-//! the ground under the wheels. The nearest range that is searched is half of that of this ground. From the right pixel follow
+//! The window of the left image is searched along its epipolar line in the right one, resampled for a plane that is
+//! parallel to the ground under the wheels. The search starts at half of the range of this ground. The right pixel gives
 //! position and covariance,
 //! ```text
-//! σ_r = r² σ_s/(f b)        along the ray, by the match between the eyes
-//! σ_⊥ = r σ_t/f             across it, by the match between the stops; 0 at the first stop, where the corner defines the point
+//! σ_r = r² σ_s/(f b)        along the ray, from the stereo match
+//! σ_⊥ = r σ_t/f             across it, from the match between the stops; 0 at the first stop, where the corner is the point
 //! ```
 //!
 //! | symbol | name | unit |
@@ -26,37 +26,38 @@ use sightline_vision::image::PixelRect;
 use super::settings::OdometrySettings;
 use super::windows::{self, Eye, Found};
 
-/// A match that lies farther beside its epipolar line is none, px.
+/// Largest distance of a match from its epipolar line, px.
 const BESIDE_MAX_PX: f64 = 1.6;
-/// How far beside the line scores are computed at most, px: the peak's neighbours are two pixels farther.
+/// Largest distance from the line at which scores are computed, px: the peak's neighbours are two pixels farther.
 const BESIDE_SCORES_PX: f64 = BESIDE_MAX_PX + 2.0;
-/// Part of the ground's range at which the search begins.
+/// Start of the search as a fraction of the ground's range.
 const NEAREST_PART: f64 = 0.5;
-/// Range of the two ends of an epipolar line's tangent, as parts of a predicted range.
+/// Ranges of the two ends of an epipolar line's tangent, relative to a predicted range.
 const NEAR_RANGE: [f64; 2] = [0.98, 1.02];
 
-/// Both eyes of a stop.
+/// Both cameras of a stop with their images.
 #[derive(Clone, Copy)]
 pub(super) struct Eyes<'a> {
     pub(super) left: Eye<'a>,
     pub(super) right: Eye<'a>,
 }
 
-/// A point that both eyes see.
+/// A point seen by both cameras.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Point {
     pub(super) left: Pixel,
     /// In the rover frame, m.
     pub(super) position: Point3,
     pub(super) covariance: Matrix3<f64>,
-    /// Movement of the position by a common shift of the matches: left pixel along x and along y, disparity; m per px.
+    /// Derivative of the position with respect to a common shift of the matches (left pixel along x and y, disparity), m
+    /// per px.
     pub(super) by_shift: [Vector3; 3],
 }
 
 /// Why a corner has no point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum NoPoint {
-    /// Its window or its epipolar line leaves the images.
+    /// Its window or its epipolar line is partly outside the images.
     Outside,
     /// No match is good enough.
     LowScore,
@@ -69,7 +70,7 @@ pub(super) fn ground_normal() -> Vector3 {
     -Vector3::z()
 }
 
-/// The point of a pixel of the left image, searched for over all ranges.
+/// The point of a pixel of the left image, searched over all ranges.
 pub(super) fn point(eyes: &Eyes<'_>, left: Pixel, settings: &OdometrySettings) -> Result<Point, NoPoint> {
     let ray = eyes.left.camera.ray(left).ok_or(NoPoint::Outside)?;
     // z points down, and the ground is at z = 0.
@@ -84,8 +85,8 @@ pub(super) fn point(eyes: &Eyes<'_>, left: Pixel, settings: &OdometrySettings) -
     of_match(eyes, left, &found, None, settings).ok_or(NoPoint::OutOfRange)
 }
 
-/// The point of a pixel of the left image whose position is predicted; `reach_px` is how far the right pixel may be from there,
-/// `left_px2` the covariance of the left pixel.
+/// The point of a pixel of the left image with a predicted position; `reach_px` is the search distance of the right pixel
+/// from the prediction, `left_px2` the covariance of the left pixel.
 pub(super) fn point_near(
     eyes: &Eyes<'_>,
     (left, left_px2): (Pixel, Matrix2<f64>),
@@ -100,7 +101,7 @@ pub(super) fn point_near(
     of_match(eyes, left, &found, Some(left_px2), settings).ok_or(NoPoint::OutOfRange)
 }
 
-/// The epipolar line between two ranges, straight.
+/// The epipolar line between two ranges, as a straight line.
 struct Line {
     ends: [Pixel; 2],
 }
@@ -112,7 +113,7 @@ impl Line {
         Some(Self { ends: [far?, near?] })
     }
 
-    /// The piece of the line within `reach_px` of the middle of its ends.
+    /// The part of the line within `reach_px` of its midpoint.
     fn middle(&self, reach_px: f64) -> Self {
         let [a, b] = self.ends;
         let middle = Pixel::new(0.5 * (a.x + b.x), 0.5 * (a.y + b.y));
@@ -121,7 +122,8 @@ impl Line {
         Self { ends: [middle.offset(-along[0], -along[1]), middle.offset(along[0], along[1])] }
     }
 
-    /// The pixels that hold the windows on the line, `margin_px` beyond its ends, and beside it as far as a match may be.
+    /// The pixels covered by the windows on the line, `margin_px` beyond its ends, and beside it up to the largest
+    /// distance of a match.
     fn region(&self, half: u32, margin_px: f64) -> PixelRect {
         let beside_px = margin_px.min(BESIDE_SCORES_PX);
         let reach = f64::from(half) + beside_px;
@@ -163,7 +165,7 @@ fn match_on_line(
     found.filter(|found| found.score >= settings.stereo_score_min).ok_or(NoPoint::LowScore)
 }
 
-/// The point of a match between the eyes; none beyond the ranges.
+/// The point of a stereo match; an error beyond the range limits.
 fn of_match(
     eyes: &Eyes<'_>,
     left: Pixel,

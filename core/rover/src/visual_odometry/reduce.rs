@@ -1,7 +1,8 @@
-//! Images as odometry compares them: reduced by averaging blocks of pixels, or smoothed.
+//! Preprocessing of images for odometry: reduction by averaging blocks of pixels, or smoothing.
 //!
-//! A detector has pixels that are brighter than others in every image. Where the view turns by a pixel or two, windows would
-//! match at this fixed pattern and show no motion; smoothing by (1, 4, 6, 4, 1)/16 along rows and columns leaves a quarter of it.
+//! A detector has pixels that are brighter than others in every image (fixed-pattern noise). If the view moves by a pixel
+//! or two, windows would match this pattern and show no motion; smoothing by (1, 4, 6, 4, 1)/16 along rows and columns
+//! reduces it to a quarter.
 
 use image::Luma;
 
@@ -17,7 +18,7 @@ pub(crate) struct Reduced {
 }
 
 impl Reduced {
-    /// Averages blocks of `factor` × `factor` pixels; incomplete blocks are dropped, an invalid pixel makes its block invalid.
+    /// Averages blocks of `factor` × `factor` pixels; drops incomplete blocks. An invalid pixel makes its block invalid.
     pub(crate) fn new(eye: Eye<'_>, factor: u32) -> Self {
         let camera = eye.camera.downsampled(factor);
         let [width, height] = camera.size;
@@ -34,7 +35,7 @@ impl Reduced {
         Self { camera, image }
     }
 
-    /// The image smoothed; within two pixels of the border, or of an invalid pixel, it is invalid.
+    /// The smoothed image; invalid within two pixels of the border or of an invalid pixel.
     pub(super) fn smoothed(eye: Eye<'_>) -> Self {
         let [width, height] = [eye.image.width() as usize, eye.image.height() as usize];
         let pixels = eye.image.as_raw();
@@ -55,7 +56,7 @@ impl Reduced {
         Self { camera: eye.camera.clone(), image }
     }
 
-    /// The image without its outermost pixels where these are invalid, as smoothing leaves them.
+    /// The image without its outermost pixels if these are invalid, as after smoothing.
     pub(super) fn inside(&self) -> PixelRect {
         let [width, height] = [self.image.width(), self.image.height()];
         let is_whole = self.image.as_raw().first().is_some_and(|value| value.is_finite());

@@ -1,15 +1,15 @@
-//! Whether the ground repeats itself along the motion, as a rover's own tracks do: another motion would fit as well.
+//! Detects ground with a repetitive pattern along the motion, like a rover's own tracks: another motion would fit as well.
 //!
-//! Some points that agree with the motion are compared at all places that other slips would put them:
+//! Some inliers are compared at all positions that other slip ratios would give them:
 //! ```text
 //! S(δ) = mean_i ncc_i(project(p_i by d + δ w/|w|))      repetition = highest other maximum of S / S(0)
 //! ```
-//! Ground that nothing repeats has one high maximum. The value is near 1 where a repeated pattern decides.
+//! Ground without repetition has one high maximum. The value is near 1 if the motion depends on a repetitive pattern.
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
 //! | d, w | motion of the rover's origin by vision, by the wheels | m, rover frame before |
-//! | δ | another way along the wheels' motion, for slips of −0.4 to 1.4 | m |
+//! | δ | displacement along the wheels' motion, for slip ratios of −0.4 to 1.4 | m |
 //! | p_i | points | m, rover frame before |
 //!
 //! Source: ours; the need is that of Opportunity's sol 1066 (driving.md 3).
@@ -28,24 +28,24 @@ use super::points::{Eyes, Point, ground_normal};
 use super::settings::OdometrySettings;
 use super::windows;
 
-/// Points that are compared, about.
+/// Approximate number of compared points.
 const POINTS: usize = 16;
-/// Wheels that moved less than this cannot tell a direction, m.
+/// Smallest motion of the wheels with a defined direction, m.
 const WHEELS_MIN_M: f64 = 0.02;
-/// Movement of the fastest point from one place to the next, px.
+/// Image motion of the fastest point between neighbouring displacements, px.
 const STEP_PX: f64 = 1.0;
-/// Most places.
+/// Largest number of displacements.
 const PLACES_MAX: f64 = 300.0;
-/// Ways after which the windows are read anew, m.
+/// Interval of displacements after which the windows are resampled, m.
 const WINDOWS_M: f64 = 0.2;
-/// Share of the points that must be in view.
+/// Smallest fraction of the points that must be in view.
 const IN_VIEW_MIN: f64 = 0.6;
-/// Part of its height to which the maximum of the motion falls before another one begins.
+/// Fraction of its height to which the motion's own maximum must fall before another one begins.
 const FALLEN: f64 = 0.75;
-/// Way from which on a maximum is always another one, m.
+/// Displacement from which on a maximum always counts as another one, m.
 const APART_M: f64 = 0.025;
 
-/// The highest other maximum as a part of that of the motion; 0 where there is none, and where the wheels stood still.
+/// The highest other maximum relative to that of the motion; 0 without one, and if the wheels did not move.
 pub(super) fn repetition(
     eyes: [&Eyes<'_>; 2],
     points: &[Point],
@@ -60,7 +60,7 @@ pub(super) fn repetition(
     line.and_then(|line| line.scores(&chosen, wheels)).map_or(0.0, |scores| scores.repetition())
 }
 
-/// The motions that differ from that of vision by a way along the motion of the wheels.
+/// The motions that differ from that of vision by a displacement along the motion of the wheels.
 struct Line<'a> {
     eyes: [&'a Eyes<'a>; 2],
     before_from_after: Pose,
@@ -75,7 +75,7 @@ impl<'a> Line<'a> {
         Some(Self { eyes, before_from_after: fitted.after_from_before.inverse(), along, half })
     }
 
-    /// From the rover frame before to that after, farther by `way_m`.
+    /// The motion from the rover frame before to that after, farther by `way_m`.
     fn motion(&self, way_m: f64) -> Pose {
         let displaced = self.before_from_after.translation.vector + self.along * way_m;
         Pose::from_parts(Translation3::from(displaced), self.before_from_after.rotation).inverse()
@@ -89,7 +89,7 @@ impl<'a> Line<'a> {
         self.eyes[1].left.camera.project(&(motion * point.position))
     }
 
-    /// Distance between two places, m; none where nothing moves in the image.
+    /// Spacing of neighbouring displacements, m; `None` if no point moves in the image.
     fn spacing_m(&self, points: &[&Point], wheels: &Vector3) -> Option<f64> {
         let px_per_m =
             |point: &&Point| Some(self.pixel(point, 0.01)?.distance(self.pixel(point, 0.0)?) / 0.01);
@@ -98,7 +98,7 @@ impl<'a> Line<'a> {
         (fastest > 0.0).then(|| (STEP_PX / fastest).max(least_m))
     }
 
-    /// The window of a point as it would appear.
+    /// The window of a point, resampled for a displacement.
     fn window(&self, point: &Point, way_m: f64) -> Option<Reference> {
         let [before, after] = self.eyes.map(|eyes| eyes.left);
         let motion = self.motion(way_m);
@@ -114,7 +114,7 @@ impl<'a> Line<'a> {
         Reference::new(&windows::window(before.image, point.left, &map, self.half)?)
     }
 
-    /// The score of a window where a motion would put the point.
+    /// The score of a window at the point's projection under a motion.
     fn score(&self, window: &Reference, point: &Point, motion: &Pose) -> Option<f64> {
         let image = self.eyes[1].left.image;
         let there = windows::around(self.pixel_by(point, motion)?, self.half, 0);
@@ -123,7 +123,7 @@ impl<'a> Line<'a> {
         window.score(&seen).map(f64::from)
     }
 
-    /// The mean scores at all places.
+    /// The mean scores at all displacements.
     fn scores(&self, points: &[&Point], wheels: &Vector3) -> Option<Scores> {
         let spacing_m = self.spacing_m(points, wheels)?;
         let seen_m = self.before_from_after.translation.vector.dot(&self.along);
@@ -152,9 +152,9 @@ impl<'a> Line<'a> {
     }
 }
 
-/// The mean scores over the ways along the motion; `None` where too few points are in view.
+/// The mean scores over the displacements along the motion; `None` if too few points are in view.
 struct Scores {
-    /// Number of the first place; that of the motion is 0.
+    /// Index of the first displacement; that of the motion is 0.
     first: i32,
     spacing_m: f64,
     means: Vec<Option<f64>>,
@@ -176,8 +176,8 @@ impl Scores {
         others.filter_map(|place| self.at(place)).fold(0.0, f64::max) / own
     }
 
-    /// Whether a place belongs to the maximum of the motion, which ends where the scores have fallen, and at the latest where
-    /// another one can be.
+    /// Whether a displacement belongs to the motion's own maximum, which ends where the scores have fallen, at the latest at
+    /// `APART_M`.
     fn is_own(&self, place: i32, own: f64) -> bool {
         let mut between = place.min(0)..=place.max(0);
         f64::from(place.abs()) * self.spacing_m < APART_M
@@ -194,7 +194,7 @@ impl Scores {
 mod tests {
     use super::*;
 
-    /// Scores at places 1 cm apart, the motion in the middle.
+    /// Scores at displacements 1 cm apart, with the motion in the middle.
     fn scores(of: impl Fn(i32) -> f64) -> Scores {
         Scores { first: -40, spacing_m: 0.01, means: (-40..=40).map(|place| Some(of(place))).collect() }
     }

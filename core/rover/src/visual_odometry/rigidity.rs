@@ -1,11 +1,12 @@
-//! Step `consistent_set`: the largest set of matches whose distances from each other the motion does not change.
+//! Step `consistent_set`: the largest set of matches whose mutual distances are the same before and after the motion.
 //!
 //! ```text
 //! i, j agree:  | |p_i − p_j| − |q_i − q_j| | < 3 σ_ij
 //! σ_ij² = eᵀ (C_pi + C_pj) e + fᵀ (C_qi + C_qj) f      e, f: directions of p_i − p_j and q_i − q_j
 //! ```
-//! The set grows from the match that agrees with most others, by that match of the remaining ones that agrees with most of
-//! them, until none agrees with all (the greedy clique of Hirschmüller 2002 and Howard 2008). It needs no motion and no draws.
+//! The set grows from the match that agrees with most others, each time by the remaining match that agrees with most of
+//! the others, until none agrees with all (the greedy clique of Hirschmüller 2002 and Howard 2008). It needs no motion and
+//! no random samples.
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
@@ -15,12 +16,12 @@
 
 use sightline_geometry::estimate::weighted_motion::Correspondence;
 
-/// Standard deviations within which two distances agree.
+/// Number of standard deviations within which two distances agree.
 const SIGMAS: f64 = 3.0;
-/// Points nearer to each other than this have no direction, m.
+/// Smallest distance of two points with a defined direction, m.
 const NEAREST_M: f64 = 1e-6;
 
-/// The matches of the largest consistent set that was found, in their order.
+/// Indices of the matches of the largest consistent set found, in ascending order.
 pub(super) fn consistent_set(pairs: &[Correspondence]) -> Vec<usize> {
     let count = pairs.len();
     let mut agrees = vec![false; count * count];
@@ -34,7 +35,7 @@ pub(super) fn consistent_set(pairs: &[Correspondence]) -> Vec<usize> {
     let mut set = Vec::new();
     while !candidates.is_empty() {
         let friends = |i: usize| candidates.iter().filter(|&&j| agrees[i * count + j]).count();
-        // Of equal ones the first.
+        // Of equal ones, the first.
         let Some(&best) = candidates.iter().max_by_key(|&&i| (friends(i), count - i)) else { break };
         set.push(best);
         candidates.retain(|&j| agrees[best * count + j]);
@@ -43,7 +44,7 @@ pub(super) fn consistent_set(pairs: &[Correspondence]) -> Vec<usize> {
     set
 }
 
-/// Whether two matches keep their distance.
+/// Whether the distance of two matches is the same before and after.
 fn agree(a: &Correspondence, b: &Correspondence) -> bool {
     let (before, after) = (a.before - b.before, a.after - b.after);
     let (long, there) = (before.norm(), after.norm());

@@ -5,25 +5,25 @@ use utoipa::ToSchema;
 
 use sightline_geometry::error::{Error, Result};
 
-/// How windows of two images are compared.
+/// Similarity measure of windows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum OdometryScore {
-    /// Normalised cross-correlation: gain and level of the light do not matter.
+    /// Normalised cross-correlation: invariant to gain and offset.
     #[default]
     Normalised,
     /// Pseudo-normalised correlation, as flown: a change of contrast lowers the score.
     PseudoNormalised,
 }
 
-/// How matches that belong to one rigid motion are told from the others.
+/// How the matches of one rigid motion are separated from the others.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ConsistentSet {
-    /// The largest set of matches whose distances from each other agree before and after (Hirschmüller 2002, Howard 2008).
+    /// The largest set of matches whose mutual distances are the same before and after (Hirschmüller 2002, Howard 2008).
     #[default]
     Rigidity,
-    /// Random draws of three matches.
+    /// RANSAC with minimal samples of three matches.
     Ransac,
 }
 
@@ -31,7 +31,7 @@ pub enum ConsistentSet {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum OdometryPreset {
-    /// Ours: the images as they are, the translation searched for before the matches.
+    /// Ours: unreduced images, the translation searched before the matches.
     #[default]
     Sightline,
     /// As flown on the Mars Exploration Rovers (Maimone, Cheng & Matthies 2007): 256 × 256 px, pseudo-normalised correlation,
@@ -45,56 +45,57 @@ pub enum OdometryPreset {
 pub struct OdometrySettings {
     /// Images wider than this are reduced by averaging blocks of 2 × 2, 3 × 3, … pixels, px (4096; 64 to 4096). `mer2007`: 256.
     pub width_max_px: u32,
-    /// Most corners (240; 20 to 2000). Too few: a covariance that grows; too many: time.
+    /// Largest number of corners (240; 20 to 2000). Too few: the covariance grows; too many: slow.
     pub corners_max: u32,
-    /// Least distance of two corners, px (8; 2 to 100).
+    /// Smallest distance of two corners, px (8; 2 to 100).
     pub corner_spacing_px: f64,
-    /// Least contrast of a corner: RMS gradient along its weakest direction, fraction of full scale per px (0.002; 0 to 1).
+    /// Smallest contrast of a corner: RMS gradient along its weakest direction, fraction of full scale per px (0.002; 0 to
+    /// 1).
     pub corner_contrast_min: f64,
-    /// Side of the windows that are compared, px (11; 5 to 41, odd).
+    /// Side of the compared windows, px (11; 5 to 41, odd).
     pub window_px: u32,
-    /// How windows are compared (`normalised`).
+    /// Similarity measure of windows (`normalised`).
     pub score: OdometryScore,
-    /// Nearest range of a point from the left camera, m (0.6; 0.1 to 10).
+    /// Smallest range of a point from the left camera, m (0.6; 0.1 to 10).
     pub range_min_m: f64,
-    /// Farthest range, m (15; 1 to 100).
+    /// Largest range, m (15; 1 to 100).
     pub range_max_m: f64,
-    /// Least score of a match between the two eyes (0.75; 0 to 1).
+    /// Smallest score of a stereo match (0.75; 0 to 1).
     pub stereo_score_min: f64,
-    /// Least score of a match between the two stops (0.7; 0 to 1).
+    /// Smallest score of a match between the two stops (0.7; 0 to 1).
     pub match_score_min: f64,
-    /// Whether the translation is searched for in coarse images first, so that slip does not matter (true).
+    /// Whether the translation is searched in coarse images first, which makes the result robust to slip (true).
     pub coarse_search: bool,
     /// Half the side of the search window around the prediction, px (12; 2 to 100).
     pub search_px: u32,
     /// How the matches of one rigid motion are found (`rigidity`).
     pub consistent_set: ConsistentSet,
-    /// Standard deviations within which a match agrees with the motion (3.4; 1 to 10).
+    /// Largest residual of an inlier, in standard deviations (3.4; 1 to 10).
     pub outlier_sigma: f64,
-    /// 1σ error of a match between the two stops beside that of its own scores, px (0.05; 0 to 2).
+    /// 1σ error of a match between the two stops, in addition to that from its scores, px (0.05; 0 to 2).
     pub match_sigma_px: f64,
-    /// The same for a match between the two eyes, px (0.05; 0 to 2).
+    /// The same for a stereo match, px (0.05; 0 to 2).
     pub stereo_sigma_px: f64,
-    /// 1σ error of a match between the stops by the relief within its window, px for each unit of change of the view, which is
-    /// 0.1 where the window grows by a tenth (0.5; 0 to 10).
+    /// 1σ error of a match between the stops due to the relief in its window, px per unit of change of the view, which is
+    /// 0.1 if the window grows by a tenth (0.5; 0 to 10).
     pub relief_px: f64,
-    /// 1σ error that all matches have in common, px, and its growth for each unit of change (0.016, 0.46; 0 to 10 each).
+    /// 1σ error common to all matches, px, and its growth per unit of change (0.016, 0.46; 0 to 10 each).
     pub common_px: [f64; 2],
-    /// Gate: least number of matches that agree (25; 4 to 1000).
+    /// Gate: smallest number of inliers (25; 4 to 1000).
     pub inliers_min: u32,
-    /// Gate: least share of the matches that agree (0.35; 0 to 1).
+    /// Gate: smallest fraction of inliers among the matches (0.35; 0 to 1).
     pub inlier_share_min: f64,
     /// Gate: largest χ² per degree of freedom (3; 1 to 100).
     pub chi2_max: f64,
     /// Gate: largest 1σ error of the translation in its worst direction, m (0.015; 0.001 to 1).
     pub sigma_max_m: f64,
-    /// Gate: largest slip along the motion of the wheels either way, as a part of it (1.4; 0 to 5).
+    /// Gate: largest slip along the motion of the wheels in either direction, relative to it (1.4; 0 to 5).
     pub slip_max: f64,
-    /// Gate: largest angle between the turn of vision and that of gyro and accelerometers, deg (2; 0.1 to 45).
+    /// Gate: largest angle between the rotation of vision and that of gyro and accelerometers, deg (2; 0.1 to 45).
     pub attitude_max_deg: f64,
-    /// Gate: most inliers of another motion as a part of those of the best (0.7; 0.1 to 1).
+    /// Gate: largest number of inliers of another motion relative to those of the best (0.7; 0.1 to 1).
     pub ambiguity_max: f64,
-    /// Gate: how well another way along the motion may fit, as a part of how well the motion fits (0.96; 0.1 to 2).
+    /// Gate: largest score of another displacement along the motion relative to that of the motion (0.96; 0.1 to 2).
     pub repetition_max: f64,
 }
 
@@ -164,10 +165,10 @@ impl OdometryPreset {
 }
 
 impl OdometrySettings {
-    /// Refuses values out of range.
+    /// Rejects values out of range.
     ///
     /// # Errors
-    /// [`Error::Setting`] that names the field and its range.
+    /// [`Error::Setting`] with the field and its range.
     pub fn validate(&self) -> Result<()> {
         let within = |key: &str, value: f64, low: f64, high: f64| {
             if (low..=high).contains(&value) {

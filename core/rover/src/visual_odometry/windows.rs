@@ -1,11 +1,12 @@
-//! Windows of two cameras that show the same part of the ground, and the best match of one in a region of an image.
+//! Resampling of windows between two cameras that see the same ground, and the best match of one in a region of an image.
 //!
-//! A window is read in the one image as the other camera sees it, with the map `∂from/∂to` of the plane through the point:
+//! A window is resampled from one image to the view of the other camera, with the affine map `∂from/∂to` of the plane
+//! through the point:
 //! ```text
 //! X(u) = o + d (n·(P − o))/(n·d)          the ray (o, d) of pixel u meets the plane (P, n)
 //! ∂to/∂from = ∂ project(to, X(u)) / ∂u    by differences of one pixel
 //! ```
-//! A plane that is seen at a grazing angle is tilted towards the camera until it makes 0.15 with the ray.
+//! A plane seen at a grazing angle is tilted towards the camera until the cosine between its normal and the ray is 0.15.
 
 use nalgebra::{Matrix2, Vector2};
 
@@ -19,18 +20,18 @@ use sightline_vision::image::{GrayImage, Patch, PixelRect, resample};
 
 use super::settings::OdometryScore;
 
-/// Least cosine between a plane's normal and the ray to the camera.
+/// Smallest cosine between a plane's normal and the ray to the camera.
 const GRAZING: f64 = 0.15;
 
 /// A camera with its image.
 #[derive(Clone, Copy)]
 pub(crate) struct Eye<'a> {
-    /// In the rover frame of its stop.
+    /// Camera model in the rover frame of its stop.
     pub(crate) camera: &'a Camera,
     pub(crate) image: &'a GrayImage,
 }
 
-/// A match below the pixel.
+/// A match with subpixel position.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Found {
     pub(super) pixel: Pixel,
@@ -65,14 +66,14 @@ pub(super) fn map_of_plane(
     map.iter().all(|value| value.is_finite()).then_some(map)
 }
 
-/// The window about a pixel of `image` as it appears where `∂to/∂from` is `map`; `None` where it is not whole.
+/// The window around a pixel of `image`, resampled for the map `map` = `∂to/∂from`; `None` if it is incomplete.
 pub(super) fn window(image: &GrayImage, pixel: Pixel, map: &Matrix2<f64>, half: u32) -> Option<Patch> {
     let from_to = map.try_inverse()?;
     let patch = Patch::from(resample::window(image, pixel, &from_to, half, Kernel::Bicubic));
     patch.is_complete().then_some(patch)
 }
 
-/// The scores of a window at the positions of a region that hold it.
+/// The scores of a window at the positions of a region that contain it.
 pub(super) fn surface(
     template: &Patch,
     image: &GrayImage,
@@ -85,13 +86,13 @@ pub(super) fn surface(
     }
 }
 
-/// The highest of the scores at whole pixels that are allowed, refined below the pixel; `None` where it is at the border of the
-/// surface.
+/// The highest score at allowed whole pixels, refined to subpixel precision; `None` if it is at the border of the score
+/// map.
 pub(super) fn best(surface: &Surface, is_allowed: impl Fn(Pixel) -> bool) -> Option<Found> {
     let mut highest = (None, f32::NEG_INFINITY);
     for (iy, row) in (0..).zip(surface.scores.chunks_exact((surface.width as usize).max(1))) {
         for (ix, score) in (0..).zip(row) {
-            // An excluded position, whose score is no number, is not above any.
+            // Excluded positions have the score NaN, which no comparison exceeds.
             if *score > highest.1 && is_allowed(surface.pixel_of(ix, iy)) {
                 highest = (Some((ix, iy)), *score);
             }
@@ -102,7 +103,7 @@ pub(super) fn best(surface: &Surface, is_allowed: impl Fn(Pixel) -> bool) -> Opt
     Some(Found { pixel: peak.pixel, score: peak.score, covariance_px2: peak.covariance_px2 })
 }
 
-/// The square region around a pixel in which a window of side 2·half + 1 is looked for up to `reach` px away.
+/// The square region around a pixel in which a window of side 2·half + 1 is searched up to `reach` px away.
 pub(super) fn around(pixel: Pixel, half: u32, reach: u32) -> PixelRect {
     PixelRect::centred(pixel, 2 * (half + reach) + 1)
 }

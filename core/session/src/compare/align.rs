@@ -1,11 +1,11 @@
-//! Which stops of several runs stand side by side.
+//! Alignment of the stops of several runs, for comparison.
 //!
 //! - *step*: the same stop of the drive;
-//! - *distance*: as far driven since each run's own pick, by the estimated poses;
-//! - *time*: as long after each run's own pick.
+//! - *distance*: equal distance driven since each run's own designation, by the estimated poses;
+//! - *time*: equal time since each run's own designation.
 //!
-//! By distance and time a stop of another run stands beside the stop of the first run that is nearest to it, where each
-//! is the other's nearest, so that no stop stands twice and none is interpolated; of two equally near the earlier counts.
+//! By distance and time, a stop of the first run is matched with the mutually nearest stop of each other run. So no stop is
+//! matched twice, and none is interpolated. Of two equally near stops the earlier one counts.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -13,24 +13,24 @@ use utoipa::ToSchema;
 use super::Compared;
 use sightline_track::trace::StepTrace;
 
-/// Which stops stand side by side.
+/// How the stops of several runs are aligned.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Alignment {
     /// The same stop of the drive.
     #[default]
     Step,
-    /// As far driven since the pick.
+    /// Equal distance driven since the designation.
     Distance,
-    /// As long after the pick.
+    /// Equal time since the designation.
     Time,
 }
 
 impl Alignment {
-    /// All of them.
+    /// All alignments.
     pub const ALL: [Self; 3] = [Self::Step, Self::Distance, Self::Time];
 
-    /// Its word.
+    /// Its name in requests.
     pub const fn word(self) -> &'static str {
         match self {
             Self::Step => "step",
@@ -39,7 +39,7 @@ impl Alignment {
         }
     }
 
-    /// The unit along which stops are compared; empty for steps.
+    /// The unit of the aligned quantity; empty for steps.
     pub const fn unit(self) -> &'static str {
         match self {
             Self::Step => "",
@@ -48,7 +48,7 @@ impl Alignment {
         }
     }
 
-    /// What it means, as one sentence.
+    /// A description in one sentence.
     pub const fn sentence(self) -> &'static str {
         match self {
             Self::Step => "Aligned by step: equal stops of the drive are side by side.",
@@ -62,16 +62,16 @@ impl Alignment {
     }
 }
 
-/// Stops that stand side by side.
+/// Aligned stops of the compared runs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Moment {
-    /// The stop of each run; null where it has none here.
+    /// The stop of each run; null if it has no aligned stop.
     pub steps: Vec<Option<usize>>,
-    /// How far along each run that is: the step, m driven, or s since the pick.
+    /// The aligned quantity of each run: the step, distance driven in m, or time since the designation in s.
     pub at: Vec<Option<f64>>,
 }
 
-/// The moments of a comparison: by step, every stop that any run has; otherwise every stop of the first run.
+/// The moments of a comparison: by step, the stops of all runs; otherwise the stops of the first run.
 pub(crate) fn moments(runs: &[Compared], align: Alignment) -> Vec<Moment> {
     if align == Alignment::Step {
         return by_step(runs);
@@ -104,7 +104,7 @@ fn by_step(runs: &[Compared]) -> Vec<Moment> {
     steps.into_iter().map(moment).collect()
 }
 
-/// How far a step is along its run.
+/// The aligned quantity of a step: the step, m driven, or s since the run's first step.
 fn along(run: &Compared, trace: &StepTrace, align: Alignment) -> f64 {
     match align {
         Alignment::Step => trace.step as f64,
@@ -113,13 +113,13 @@ fn along(run: &Compared, trace: &StepTrace, align: Alignment) -> f64 {
     }
 }
 
-/// The place in `other` whose nearest place in `first` is `k`, and which is the nearest to it.
+/// The index in `other` that is nearest to `first[k]`, if `k` is also the nearest to it.
 fn mutual(first: &[f64], k: usize, other: &[f64]) -> Option<usize> {
     let found = nearest(other, first[k])?;
     (nearest(first, other[found]) == Some(k)).then_some(found)
 }
 
-/// Where the nearest value is; of two equally near the earlier.
+/// The index of the nearest value; of two equally near the earlier.
 fn nearest(values: &[f64], to: f64) -> Option<usize> {
     (0..values.len()).min_by(|&a, &b| (values[a] - to).abs().total_cmp(&(values[b] - to).abs()))
 }

@@ -1,4 +1,4 @@
-//! The quantities of runs as columns with units, each with its difference from the first run; gates by their names.
+//! The quantities and gates of runs as columns with units, each with its difference from the first run.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -10,38 +10,38 @@ use sightline_geometry::error::{Error, Result};
 use sightline_record::{Kind, StageRecord};
 use sightline_track::stages::judge::Gate;
 
-/// Numbers of all runs over the moments.
+/// A numeric column: one value for each run and moment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Column {
-    /// Its name: a column of the record, or `gates.` with the gate's name and `value`, `limit` or `margin`.
+    /// Its name: a column of the record, or `gates.NAME.value`, `.limit` or `.margin`.
     pub name: String,
-    /// Its unit; empty for pure numbers, counts, and switches (0 or 1).
+    /// Its unit; empty for pure numbers, counts, and flags (0 or 1).
     pub unit: String,
-    /// The value of each run at each moment.
+    /// The value of each run at each moment; null if missing.
     pub values: Vec<Vec<Option<f64>>>,
-    /// Each run's value less the first run's, at each moment.
+    /// Each run's value minus the first run's value, at each moment.
     pub deltas: Vec<Vec<Option<f64>>>,
 }
 
-/// Words of all runs over the moments.
+/// A column of words: one word for each run and moment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct WordColumn {
     /// Its name.
     pub name: String,
-    /// The words of each run at each moment.
+    /// The word of each run at each moment; null if missing.
     pub values: Vec<Vec<Option<String>>>,
-    /// At which moments not all runs that have one say the same.
+    /// At each moment, whether the words of the runs differ.
     pub differs: Vec<bool>,
 }
 
-/// What of a gate is a column.
+/// A column of a gate: its name and how it is read.
 type GateColumn = (&'static str, fn(&Gate) -> Option<f64>);
 
-/// The numbers of a gate.
+/// The columns of a gate.
 const GATE: [GateColumn; 3] =
     [("value", |gate| gate.value), ("limit", |gate| Some(gate.limit)), ("margin", |gate| gate.margin)];
 
-/// The columns of runs over the moments; with `asked` only those, which must exist.
+/// The columns of the runs over the moments; if `asked` is given, only the columns that it names.
 ///
 /// # Errors
 /// [`Error::Request`] for a column that does not exist.
@@ -86,7 +86,7 @@ pub(crate) fn columns(
     }
 }
 
-/// The columns of all gates that any step has.
+/// The columns of all gates that occur in any step.
 fn gates(traces: &[Vec<Option<&RunStep>>], is_asked: impl Fn(&str) -> bool) -> Vec<Column> {
     let all = || traces.iter().flatten().flatten().filter_map(|trace| trace.verdict());
     let mut names: Vec<(u8, &str, &str)> = all()
@@ -114,7 +114,7 @@ fn gates(traces: &[Vec<Option<&RunStep>>], is_asked: impl Fn(&str) -> bool) -> V
 
 impl Column {
     fn new(name: String, unit: String, values: Vec<Vec<Option<f64>>>) -> Self {
-        // A covariance that does not exist is not finite, which JSON cannot say.
+        // A missing covariance is not finite, which JSON cannot represent.
         let values: Vec<Vec<Option<f64>>> = values
             .into_iter()
             .map(|run| run.into_iter().map(|v| v.filter(|v| v.is_finite())).collect())

@@ -1,7 +1,7 @@
-//! Where two records differ: each value with its path, its unit and both sides.
+//! The differences of two records: each differing value with its path, its unit and both sides.
 //!
-//! Units come from the names of fields (`_px`, `_m`, …), as everywhere in the house; a gate says its own. Numbers are
-//! equal when their bits are, unless a tolerance is given for their unit: then when they differ by no more than that.
+//! Units follow from the names of fields (`_px`, `_m`, …); gates record their own unit. Numbers are equal if their bits are
+//! equal, or if they differ by no more than the tolerance that is given for their unit.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,7 +11,7 @@ use utoipa::ToSchema;
 
 use sightline_geometry::error::{Error, Result};
 
-/// The units that a tolerance may be given for, as a person types them and as they are shown.
+/// The units for which a tolerance may be given, as typed and as shown.
 pub const UNITS: [(&str, &str); 8] = [
     ("px2", "px²"),
     ("px", "px"),
@@ -23,7 +23,7 @@ pub const UNITS: [(&str, &str); 8] = [
     ("1", ""),
 ];
 
-/// By how much values of a unit may differ and still count as equal.
+/// The largest difference at which values still count as equal, by unit.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tolerance(BTreeMap<&'static str, f64>);
 
@@ -31,7 +31,7 @@ impl Tolerance {
     /// Reads tolerances by unit.
     ///
     /// # Errors
-    /// [`Error::Request`] for a unit that there is not, or a tolerance that is negative or no number.
+    /// [`Error::Request`] for an unknown unit, or a tolerance that is negative or not finite.
     pub fn new(by_unit: &BTreeMap<String, f64>) -> Result<Self> {
         let mut found = BTreeMap::new();
         for (unit, tolerance) in by_unit {
@@ -52,7 +52,7 @@ impl Tolerance {
         Ok(Self(found))
     }
 
-    /// Whether every bit counts.
+    /// Whether all tolerances are zero, so that values must be equal in every bit.
     pub fn is_exact(&self) -> bool {
         self.0.values().all(|tolerance| *tolerance == 0.0)
     }
@@ -69,21 +69,21 @@ impl Tolerance {
 /// A value that differs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Difference {
-    /// Where it is in the record: names of fields, with dots between.
+    /// Its path in the record: names of fields, separated by dots.
     pub path: String,
     /// Its unit; empty for pure numbers and words.
     pub unit: String,
-    /// The first run's value; null where it has none.
+    /// The first run's value; null if it has none.
     #[schema(value_type = Value)]
     pub a: Value,
-    /// The other run's value; null where it has none.
+    /// The other run's value; null if it has none.
     #[schema(value_type = Value)]
     pub b: Value,
-    /// The other less the first; for lists of numbers the length of their difference.
+    /// `b` minus `a`; for lists of numbers the Euclidean norm of the difference; null if not numeric.
     pub delta: Option<f64>,
 }
 
-/// Every value in which two records differ.
+/// All values in which two records differ.
 pub fn differences(a: &Value, b: &Value, tolerance: &Tolerance) -> Vec<Difference> {
     let mut found = Vec::new();
     walk("", "", a, b, tolerance, &mut found);
@@ -101,7 +101,7 @@ fn walk(path: &str, unit: &str, a: &Value, b: &Value, tolerance: &Tolerance, fou
         }
         (Value::Array(a), Value::Array(b)) if a.len() == b.len() && !numbers(a, b) => {
             for (i, (left, right)) in a.iter().zip(b).enumerate() {
-                // Items with a name are known by it, where both are of the same.
+                // Items are identified by their name if both have the same one, else by their index.
                 let name = |item: &Value| item.get("name").and_then(Value::as_str).map(str::to_owned);
                 let key = name(left).filter(|key| name(right).as_ref() == Some(key));
                 let key = key.unwrap_or_else(|| i.to_string());
@@ -153,7 +153,7 @@ fn delta(a: &Value, b: &Value) -> Option<f64> {
     }
 }
 
-/// The unit of a field: its own, or that of the record around it, or what a gate says.
+/// The unit of a field: the one recorded in a gate, else the one that its name ends with, else that of the enclosing record.
 fn unit_in(key: &str, record: &Map<String, Value>, around: &str) -> String {
     let said = record.get("unit").and_then(Value::as_str);
     if let Some(said) = said.filter(|_| matches!(key, "value" | "limit" | "margin")) {
@@ -162,13 +162,13 @@ fn unit_in(key: &str, record: &Map<String, Value>, around: &str) -> String {
     unit_of(key).unwrap_or(around).to_owned()
 }
 
-/// The unit that a field's name tells.
+/// The unit that follows from a field's name.
 pub(crate) fn unit_of(key: &str) -> Option<&'static str> {
     let is_pixel = key.contains("pixel") || matches!(key, "predicted_left" | "predicted_right");
     match key {
         _ if key.starts_with("covariance_in_") => Some("m²"),
         _ if key.ends_with("_in_rover") || key.ends_with("_in_site") => Some("m"),
-        // A derivative by the pixel is none.
+        // A derivative with respect to a pixel is not in px.
         _ if is_pixel && !key.contains("by_pixel") => Some("px"),
         _ => UNITS
             .iter()
@@ -177,23 +177,23 @@ pub(crate) fn unit_of(key: &str) -> Option<&'static str> {
     }
 }
 
-/// A path in words: without underlines, and without the unit that its last name ends with.
+/// A path in words: without dots, underscores and final unit.
 pub fn words_of(path: &str) -> String {
     let stem =
         UNITS.iter().find_map(|(typed, _)| path.strip_suffix(typed)?.strip_suffix('_')).unwrap_or(path);
     stem.replace(['_', '.'], " ")
 }
 
-/// Two values in words, with as many digits as tell them apart.
+/// Formats two values with as many digits as are needed to distinguish them.
 pub fn told_apart(a: &Value, b: &Value) -> [String; 2] {
-    // Numbers that a person wrote keep their digits.
+    // Numbers with few decimals, as a person writes them, keep all their digits.
     let written = [a, b].map(decimals_of).into_iter().max().filter(|&count| count <= 6).unwrap_or_default();
     let with = |decimals: usize| [a, b].map(|value| word(value, decimals));
     let apart = (written.max(3)..=12).map(with).find(|[a, b]| a != b);
     apart.unwrap_or_else(|| [a, b].map(ToString::to_string))
 }
 
-/// How many decimals the shortest way of writing a number has.
+/// Number of decimals of the shortest representation of a number.
 fn decimals_of(value: &Value) -> usize {
     value.as_f64().and_then(|number| Some(number.to_string().split_once('.')?.1.len())).unwrap_or_default()
 }

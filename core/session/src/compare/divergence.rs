@@ -1,8 +1,8 @@
-//! Where two runs differ first: step, stage and value.
+//! The first difference of two runs: step, stage and value.
 //!
-//! Stages are compared in running order, so that what is found is the cause rather than what follows from it: a run
-//! that was forked with another search window differs first in `match_template` of its fork step. What stages hand on
-//! without recording it (images, remembered templates) shows in the first stage that makes use of it.
+//! Stages are compared in running order, so that the cause is found rather than its consequences: a run forked with another
+//! search window differs first in `match_template` of its fork step. Data that stages pass on without recording it (images,
+//! stored templates) shows in the first stage that uses it.
 
 use std::sync::Arc;
 
@@ -17,23 +17,23 @@ use crate::step::RunStep;
 use sightline_record::{ArrayDecl, ArrayKind, ArrayView};
 use sightline_track::records;
 
-/// The most values of a stage that are listed.
+/// Maximum number of listed values of a stage.
 const VALUES_MAX: usize = 40;
 
-/// Where a run and the first one differ first.
+/// The first difference of a run from the first run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct FirstDivergence {
     /// The run.
     pub run: RunName,
-    /// How many stops of the two were compared.
+    /// Number of compared stops.
     pub compared: usize,
-    /// Where they differ; null where they do not.
+    /// The first difference; null if they do not differ.
     pub divergence: Option<Divergence>,
-    /// The same as one sentence.
+    /// The result as one sentence.
     pub sentence: String,
 }
 
-/// A stage in which two runs differ, and how.
+/// The first stage in which two runs differ.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Divergence {
     /// The stop of the first run.
@@ -42,15 +42,15 @@ pub struct Divergence {
     pub other_step: usize,
     /// The stage.
     pub stage: String,
-    /// The step of `locate`, where it is one.
+    /// The step of `locate`; null for other stages.
     pub part: Option<String>,
-    /// The values that differ, the most telling first.
+    /// The differing values, the most informative first.
     pub values: Vec<Difference>,
-    /// How many differ in this stage.
+    /// Number of differing values in this stage.
     pub count: usize,
 }
 
-/// Where run `other` and the first one differ first.
+/// Finds the first difference of run `other` from run 0.
 pub(crate) fn first(
     runs: &[Compared],
     other: usize,
@@ -65,7 +65,7 @@ pub(crate) fn first(
             moment.steps[0].and_then(|step| a.step(step)).zip(moment.steps[other].and_then(|s| b.step(s)));
         let Some((left, right)) = steps else { continue };
         compared += 1;
-        // Steps that a fork shares are the very same values.
+        // A fork shares its earlier steps by pointer.
         if !Arc::ptr_eq(left, right) {
             divergence = of_step(left, right, tolerance);
         }
@@ -77,7 +77,7 @@ pub(crate) fn first(
     FirstDivergence { run: b.name, compared, divergence, sentence }
 }
 
-/// The first stage in which two steps differ.
+/// Finds the first stage in which two steps differ.
 pub(crate) fn of_step(a: &RunStep, b: &RunStep, tolerance: &Tolerance) -> Option<Divergence> {
     PLACES.iter().find_map(|place| {
         let mut values = of_place(place, a, b, tolerance);
@@ -94,12 +94,12 @@ pub(crate) fn of_step(a: &RunStep, b: &RunStep, tolerance: &Tolerance) -> Option
     })
 }
 
-/// The values of a stage that differ, the most telling first.
+/// The differing values of a stage, the most informative first.
 fn of_place(place: &Place, a: &RunStep, b: &RunStep, tolerance: &Tolerance) -> Vec<Difference> {
     let mut values = differ::differences(&(place.record)(a), &(place.record)(b), tolerance);
     values.extend(place.arrays().filter_map(|array| of_array(array, a, b, tolerance)));
     let rank = |value: &Difference| {
-        // A limit that was changed tells more than what was decided by it.
+        // A changed limit is more informative than the decisions that follow from it.
         let is_limit = value.path.ends_with(".limit");
         let telling = place.telling().iter().position(|beginning| value.path.starts_with(beginning));
         (!is_limit, telling.unwrap_or(place.telling().len()))
@@ -108,7 +108,7 @@ fn of_place(place: &Place, a: &RunStep, b: &RunStep, tolerance: &Tolerance) -> V
     values
 }
 
-/// How an array differs: in size, or in the first value that does.
+/// The difference of an array: in size, else in the first differing value.
 fn of_array(array: &ArrayDecl, a: &RunStep, b: &RunStep, tolerance: &Tolerance) -> Option<Difference> {
     let (name, unit) = (array.name.as_ref(), array.unit.symbol());
     let path = format!("arrays.{name}");
@@ -126,7 +126,7 @@ fn of_array(array: &ArrayDecl, a: &RunStep, b: &RunStep, tolerance: &Tolerance) 
     if left.size() != right.size() {
         return different(size_of(&left).into(), size_of(&right).into(), None, path);
     }
-    // The columns of a table have units of their own: only bits can be compared.
+    // The columns of a table have different units, so only an exact comparison is possible.
     if matches!(array.kind, ArrayKind::Table | ArrayKind::Mesh) && !tolerance.is_exact() {
         return None;
     }

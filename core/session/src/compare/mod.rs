@@ -1,14 +1,14 @@
-//! Two to four runs side by side: which stops belong together, every column with its difference, where the first run
-//! and each other one differ first, and which settings do.
+//! Comparison of two to four runs: aligned stops, all columns with their differences, the first difference of each run from
+//! the first one, and the differing settings.
 //!
 //! ```text
-//! align        which stops stand side by side: by step, by distance driven, or by time
-//! columns      the lines of a run as columns, gates included
-//! differ       where two records differ, with unit and tolerance
-//! stages       what each stage of a step returned, in running order
+//! align        alignment of stops: by step, by distance driven, or by time
+//! columns      quantities and gates as columns
+//! differ       differences of two records, with unit and tolerance
+//! stages       the results of the stages of a step, in running order
 //! divergence   the first step, stage and value at which two runs differ
 //! ```
-//! Runs may be of different targets and trackers, but of one session, whose stops they share. Nothing is interpolated.
+//! The runs may have different targets and trackers, but belong to one session and share its stops. Nothing is interpolated.
 
 pub(crate) mod align;
 pub(crate) mod columns;
@@ -35,10 +35,10 @@ use crate::step::RunStep;
 use sightline_geometry::error::{Error, Result};
 use sightline_track::settings::Settings;
 
-/// The most runs that are compared at a time: there are four marks for them.
+/// Maximum number of compared runs: the plots have four marks.
 pub const RUNS_MAX: usize = 4;
 
-/// A run of a session.
+/// Identifies a run of a session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RunName {
@@ -48,47 +48,47 @@ pub struct RunName {
     pub run: usize,
 }
 
-/// Asks for a comparison.
+/// Requests a comparison.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewComparison {
     /// Two to four runs; the others are compared with the first.
     #[schema(min_items = 2, max_items = 4)]
     pub runs: Vec<RunName>,
-    /// Which stops stand side by side.
+    /// How stops are aligned.
     #[serde(default)]
     pub align: Alignment,
-    /// By how much values of a unit (`px`, `px2`, `m`, `m2`, `rad`, `deg`, `s`, or `1` for none) may differ and still
-    /// count as equal; a unit that is left out must agree in every bit.
+    /// The largest difference at which values still count as equal, by unit (`px`, `px2`, `m`, `m2`, `rad`, `deg`, `s`, or
+    /// `1` for none); values of a unit that is left out must be equal in every bit.
     #[serde(default)]
     pub tolerance: BTreeMap<String, f64>,
-    /// The columns to give, by name; left out: all of them.
+    /// The columns to return, by name; default: all.
     #[serde(default)]
     pub columns: Option<Vec<String>>,
 }
 
-/// Runs side by side.
+/// The comparison of runs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Comparison {
-    /// The runs, as they were asked for.
+    /// The runs, in the order of the request.
     pub runs: Vec<RunName>,
-    /// Which stops stand side by side.
+    /// How stops are aligned.
     pub align: Alignment,
-    /// The same as one sentence.
+    /// The alignment as one sentence.
     pub aligned_by: String,
-    /// The stops that stand side by side.
+    /// The aligned stops.
     pub moments: Vec<Moment>,
-    /// Numbers, a column each.
+    /// Numeric columns.
     pub columns: Vec<Column>,
-    /// Words, a column each.
+    /// Columns of words.
     pub words: Vec<WordColumn>,
-    /// For each run but the first: where it and the first differ first.
+    /// The first difference of each other run from the first.
     pub first: Vec<FirstDivergence>,
-    /// The settings that are not alike.
+    /// The settings that differ.
     pub settings: Vec<SettingDifference>,
 }
 
-/// A setting that is not alike in all runs.
+/// A setting that is not equal in all runs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct SettingDifference {
     /// Its name.
@@ -102,10 +102,10 @@ pub struct SettingDifference {
     pub values: Vec<Value>,
 }
 
-/// A run that is compared: its configuration and its steps so far.
+/// A run to compare: its configuration and its steps so far.
 #[derive(Clone, Debug)]
 pub struct Compared {
-    /// Which run it is.
+    /// Target and run number.
     pub name: RunName,
     /// Its configuration.
     pub settings: Arc<Settings>,
@@ -119,7 +119,7 @@ impl Compared {
         Self { name, settings: Arc::clone(&run.settings), steps: run.steps.clone() }
     }
 
-    /// The record of a stop, where it was computed.
+    /// The record of a stop; `None` if it was not computed.
     pub fn step(&self, step: usize) -> Option<&Arc<RunStep>> {
         let first = self.steps.first()?.step;
         self.steps.get(step.checked_sub(first)?)
@@ -130,7 +130,7 @@ impl Session {
     /// The runs that a comparison names.
     ///
     /// # Errors
-    /// [`Error::Request`] for fewer than two or more than four, one named twice, or one that does not exist.
+    /// [`Error::Request`] for fewer than two or more than four runs, or a run that is named twice or does not exist.
     pub fn compared(&self, runs: &[RunName]) -> Result<Vec<Compared>> {
         if !(2..=RUNS_MAX).contains(&runs.len()) {
             let count = runs.len();
@@ -146,10 +146,10 @@ impl Session {
     }
 }
 
-/// Compares runs; the others with the first.
+/// Compares each other run with the first.
 ///
 /// # Errors
-/// [`Error::Request`] for a unit or a column that does not exist, or a tolerance that is no size.
+/// [`Error::Request`] for an unknown unit or column, or an invalid tolerance.
 pub fn compare(runs: &[Compared], asked: &NewComparison) -> Result<Comparison> {
     let tolerance = Tolerance::new(&asked.tolerance)?;
     let moments = align::moments(runs, asked.align);
@@ -167,13 +167,13 @@ pub fn compare(runs: &[Compared], asked: &NewComparison) -> Result<Comparison> {
     })
 }
 
-/// The settings that are not alike in all runs.
+/// The settings that are not equal in all runs.
 fn settings(runs: &[Compared]) -> Vec<SettingDifference> {
     let documents: Vec<Value> =
         runs.iter().map(|run| serde_json::to_value(run.settings.as_ref()).unwrap_or_default()).collect();
     let value = |document: &Value, group: &str, key: &str| {
         let inside = document.get(group).and_then(|place| place.get(key));
-        // The choice of the tracker is a group of its own.
+        // The choice of the tracker is not inside a group.
         inside.or_else(|| document.get(key)).cloned().unwrap_or_default()
     };
     let differing = |info: sightline_track::limits::SettingInfo| {

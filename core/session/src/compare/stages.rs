@@ -1,4 +1,4 @@
-//! The results of the stages of a step, in running order. Each step of `locate` has a result of its own.
+//! The results of the stages of a step, in running order. Each step of `locate` has its own result.
 
 use std::sync::LazyLock;
 
@@ -13,48 +13,48 @@ type Record = Box<dyn Fn(&RunStep) -> Value + Send + Sync>;
 
 /// A stage, or a step of `locate`, with the function that reads its result.
 pub(crate) struct Place {
-    /// The stage's word.
+    /// The stage's name.
     pub stage: &'static str,
-    /// The word of the step of `locate`; none for a whole stage.
+    /// The name of the step of `locate`; `None` for a whole stage.
     pub part: Option<&'static str>,
-    /// The result; null where the stage was not reached.
+    /// Reads the result; null if the stage was not reached.
     pub record: Record,
 }
 
 impl Place {
-    /// The arrays that it makes.
+    /// The arrays that it declares.
     pub(crate) fn arrays(&self) -> impl Iterator<Item = &'static ArrayDecl> {
-        // A stage that stands at two places makes its arrays at the one with the name of its step.
+        // A stage with several entries declares its arrays under the name of its step.
         let stage = records::stage(self.word());
         stage.into_iter().flat_map(|stage| &stage.schema().arrays)
     }
 
-    /// The word by which people know it.
+    /// The displayed name: the step of `locate` if there is one, else the stage.
     pub(crate) fn word(&self) -> &'static str {
         self.part.unwrap_or(self.stage)
     }
 
-    /// Fields that tell most, the most telling first: the beginnings of their paths.
+    /// Prefixes of the paths of the most informative fields, in descending order.
     pub(crate) fn telling(&self) -> &'static [&'static str] {
         let own = TELLING.iter().find(|(word, _)| *word == self.word());
         own.map_or(&[], |(_, fields)| fields)
     }
 }
 
-/// Every place of every tracker, in running order: the stages of the record; before the steps of `locate` the tracker.
+/// The stages of all trackers in running order; the name of the tracker precedes the steps of `locate`.
 pub(crate) static PLACES: LazyLock<Vec<Place>> = LazyLock::new(|| {
-    // The row repeats the stages, and the truth is no stage.
+    // The row repeats values of the stages, and the truth is not a stage.
     let is_place =
         |stage: &&'static Stage<RunStep>| !["step", "truth"].contains(&stage.schema().stage.as_ref());
     let mut places: Vec<Place> = records::stages().iter().filter(is_place).map(place).collect();
     let first_step = places.iter().position(|place| place.part.is_some()).unwrap_or(0);
-    // Two trackers that differ do so here.
+    // Runs of different trackers differ first here.
     let tracker: fn(&RunStep) -> Value = |trace| json!({ "tracker": tracker(trace) });
     places.insert(first_step, Place { stage: "locate", part: None, record: Box::new(tracker) });
     places
 });
 
-/// The most telling fields of the stages that have some.
+/// The most informative fields by stage.
 const TELLING: [(&str, &[&str]); 15] = [
     ("predict", &["position_in_rover"]),
     ("point_mast", &["used", "predicted_left"]),
@@ -96,7 +96,7 @@ fn json(value: &impl serde::Serialize) -> Value {
     serde_json::to_value(value).unwrap_or_default()
 }
 
-/// A stop whose files are damaged has no record of `capture`, but a fault.
+/// A stop with damaged files has a fault instead of a record of `capture`.
 fn capture(trace: &RunStep) -> Value {
     match trace.fault() {
         Some(fault) => json!({ "fault": fault }),
@@ -128,7 +128,7 @@ fn coarse(trace: &RunStep) -> Value {
     })
 }
 
-/// What `locate` returned as a whole; its steps have records of their own.
+/// The result of `locate` as a whole, without the records of its steps.
 fn located(trace: &RunStep) -> Value {
     let mut record = json(&trace.located());
     if let Some(fields) = record.as_object_mut() {

@@ -1,4 +1,4 @@
-//! Comparisons of runs whose truth is known: forks of a drive before a textured plane.
+//! Comparisons of runs with known truth: forks of a drive towards a textured plane.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -116,7 +116,7 @@ fn equal_runs_never_differ_and_a_run_computed_anew_is_equal_to_the_bit() {
 fn a_tolerance_moves_the_first_divergence_on_to_where_it_is_exceeded() {
     let world = world();
     let mut session = session(&world);
-    // A copy of the run whose range is off by 1 mm at step 2 and by 1 cm at step 4.
+    // A copy of the run with its range changed by 1 mm at step 2 and by 1 cm at step 4.
     let mut copy = Compared::new(A, session.run(0, 0).unwrap());
     copy.name.run = 1;
     for (step, off_m) in [(2, 1e-3), (4, 1e-2)] {

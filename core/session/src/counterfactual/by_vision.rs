@@ -1,7 +1,7 @@
-//! The prediction where visual odometry puts it, for a step whose pose is not by vision: odometry was off, checked the slip
-//! alone, or refused its motion. It is measured on the images that were taken.
+//! Tries the prediction by visual odometry, for a step whose pose is not corrected by it: odometry was off, only checked the
+//! slip, or refused its motion. The motion is measured on the recorded images.
 //!
-//! The prediction moves in the left image alone; it keeps its distance from the camera and its covariance.
+//! The prediction moves in the left image only; its range and its covariance stay unchanged.
 
 use super::trials::{Reach, Trials};
 use super::{Finding, Moved};
@@ -14,12 +14,12 @@ use sightline_geometry::frames::{Pixel, Pose};
 use sightline_rover::visual_odometry::{MeasuredMotion, OdometryMode, OdometryPreset};
 use sightline_track::settings::Changes;
 
-/// Whether the pose of a step is not by vision already.
+/// Whether the pose of a step is not already corrected by visual odometry.
 pub(super) fn applies(recorded: &RunStep) -> bool {
     recorded.step > 0 && recorded.odometry.as_deref().is_none_or(|measured| !measured.corrects)
 }
 
-/// The step with the prediction where vision puts it, if it turns by that.
+/// Computes the step with the prediction by visual odometry; `None` if the goal is not reached.
 pub(super) fn look<D: Drive>(trials: &mut Trials<'_, D>, cancel: Cancel<'_>) -> Result<Option<Finding>> {
     let recorded = trials.base.recorded;
     let Some(from) = recorded.point_mast.predicted_left else { return Ok(None) };
@@ -33,7 +33,7 @@ pub(super) fn look<D: Drive>(trials: &mut Trials<'_, D>, cancel: Cancel<'_>) -> 
     }))
 }
 
-/// The motion by vision, after from before, with where it is from as a clause.
+/// The motion by visual odometry (rover frame after from before), and its source as a clause.
 fn motion<D: Drive>(drive: &D, recorded: &RunStep, cancel: Cancel<'_>) -> Result<Option<(Pose, String)>> {
     if let Some(measured) = recorded.odometry.as_deref() {
         let because = match refusal(measured) {
@@ -45,7 +45,7 @@ fn motion<D: Drive>(drive: &D, recorded: &RunStep, cancel: Cancel<'_>) -> Result
     let how = (OdometryMode::Full, OdometryPreset::Sightline);
     match MeasuredMotion::measure(drive, recorded.step, None, how, cancel) {
         Err(Error::Cancelled) => Err(Error::Cancelled),
-        // Images of the stop before that cannot be read.
+        // The images of the previous stop cannot be read.
         Err(_) => Ok(None),
         Ok(measured) => {
             let because = "the prediction by visual odometry, which is off in this drive";
@@ -54,7 +54,8 @@ fn motion<D: Drive>(drive: &D, recorded: &RunStep, cancel: Cancel<'_>) -> Result
     }
 }
 
-/// Where the left camera sees the predicted position, if the rover moved like that from the estimated pose of the stop before.
+/// Projects the predicted position into the left image, after this motion from the estimated pose of the previous stop.
+/// `None` outside the image.
 fn predicted<D: Drive>(drive: &D, recorded: &RunStep, after_from_before: &Pose) -> Option<Pixel> {
     let in_site = recorded.prediction()?.position_in_site;
     let before = drive.site_from_rover(recorded.step - 1).inverse() * in_site;

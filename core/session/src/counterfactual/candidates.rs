@@ -1,8 +1,8 @@
-//! Which settings a change could help at a step: those that its tracker and the stages up to its verdict use.
+//! The settings whose change could alter the verdict of a step: those that its tracker and the stages up to `judge` use.
 //!
-//! Left out is what has no say in this step's verdict: warnings about designations, how many retries follow, what is
-//! renewed or remembered after an acceptance, what only widens a covariance; settings of methods that are switched off;
-//! those of point stereo while the match itself fails, which comes before it; and seeds, since luck is no reason.
+//! Excluded are settings without influence on this verdict: warnings about designations, the number of retries, renewal and
+//! storage after an acceptance, inflation of a covariance, methods that are switched off, point stereo while the match
+//! itself fails (it runs before), and random seeds, because chance explains nothing.
 
 use super::Goal;
 use crate::what_if::Base;
@@ -11,7 +11,7 @@ use sightline_track::locate::Evidence;
 use sightline_track::settings::Settings;
 use sightline_track::target::TrackingState;
 
-/// What never has a say.
+/// Settings that never influence the verdict.
 const NEVER: [&str; 24] = [
     "tracker",
     "warn_depth_range",
@@ -39,7 +39,7 @@ const NEVER: [&str; 24] = [
     "features_max",
 ];
 
-/// What point stereo and triangulation use.
+/// Settings of point stereo and triangulation.
 const STEREO: [&str; 8] = [
     "epipolar_tolerance_px",
     "stereo_reference",
@@ -51,11 +51,11 @@ const STEREO: [&str; 8] = [
     "slope_bend_px",
 ];
 
-/// Criteria that a limit switches on: they can only reject.
+/// Gates that a non-default limit switches on: they can only reject.
 const CRITERIA: [&str; 4] =
     ["left_right_max_px", "second_peak_ratio_max", "match_sigma_max_px", "edge_distance_min_px"];
 
-/// The settings to look at, in the order of the table.
+/// The settings to try, in the order of the table.
 pub(super) fn candidates(base: &Base<'_>, goal: Goal) -> Vec<SettingInfo> {
     let table = Settings::table();
     let settings = serde_json::to_value(base.settings).unwrap_or_default();
@@ -98,7 +98,7 @@ fn limit_is_used(key: &str, base: &Base<'_>, goal: Goal) -> bool {
     !key.starts_with("confidence") && (is_on || (goal == Goal::NotFalse && CRITERIA.contains(&key)))
 }
 
-/// The limit of a gate of this step: once lost, the target returns at another confidence.
+/// Whether the setting is the limit of a gate of this step: a lost target has another confidence limit.
 fn confidence_is_used(key: &str, base: &Base<'_>) -> bool {
     let gates = base.recorded.verdict().into_iter().flat_map(|verdict| &verdict.gates);
     gates.into_iter().any(|gate| gate.setting.as_deref() == Some(key))
@@ -116,7 +116,7 @@ fn template_is_used(key: &str, base: &Base<'_>) -> bool {
     }
 }
 
-/// Whether the match met its own criterion, so that what comes after it decides.
+/// Whether the match passed the gate `ncc`, so that the later stages decide.
 fn is_matched(base: &Base<'_>) -> bool {
     let gates = base.recorded.verdict().into_iter().flat_map(|verdict| &verdict.gates);
     gates.into_iter().any(|gate| gate.name == "ncc" && gate.passed)

@@ -1,7 +1,7 @@
-//! Where the answer need not be searched for: the limit of a failed criterion must be the value that failed.
+//! Changes that need no search: a failed gate passes if its limit is the value that failed.
 //!
 //! The limits of criteria 3 and 4 are proportional to `tolerance_factor`, so that with the value v, the limit l and the
-//! factor g the answer is `g v / l`. All of them are rounded to the loose side, to a tenth of the change.
+//! factor g the answer is `g v / l`. All are rounded to the loose side, by at most a tenth of the change.
 
 use serde_json::{Value, json};
 
@@ -14,7 +14,7 @@ use sightline_track::limits::{Domain, SettingInfo};
 use sightline_track::settings::Settings;
 use sightline_track::stages::judge::Gate;
 
-/// The value of a limit with which its own failed gates are met; none where it is to be searched for.
+/// The value of a limit with which its own failed gates pass; `None` if it must be searched for.
 pub(super) fn exact_limit<D: Drive>(
     trials: &Trials<'_, D>,
     info: &SettingInfo,
@@ -27,7 +27,7 @@ pub(super) fn exact_limit<D: Drive>(
     let verdict = trials.base.recorded.verdict()?;
     let failed: Vec<&Gate> = verdict.gates.iter().filter(|gate| !gate.passed).collect();
     let own = |gate: &&&Gate| gate.setting.as_deref() == Some(info.key.as_str());
-    // With another criterion unmet no value of this limit helps; the search says so.
+    // If a gate of another setting failed, no value of this limit helps; the search reports that.
     let all_own = !failed.is_empty() && failed.iter().filter(own).count() == failed.len();
     let wanted = all_own.then(|| failed.iter().map(|gate| wanted(gate, from)));
     let wanted: Vec<f64> = wanted?.collect::<Option<_>>()?;
@@ -35,13 +35,13 @@ pub(super) fn exact_limit<D: Drive>(
     in_domain(info, round_outward(from, from, farthest))
 }
 
-/// The value of the setting at which a failed gate is just passed: the limit is the setting or proportional to it.
+/// The value of the setting at which a failed gate just passes: the limit is the setting, or proportional to it.
 fn wanted(gate: &Gate, from: f64) -> Option<f64> {
     let value = gate.value?;
     Some(if gate.limit == from { value } else { from * value / gate.limit })
 }
 
-/// A criterion that is off has no failed value: the loosest limit that rejects lies just below the number it would judge.
+/// The loosest limit with which a gate that is off rejects the step: just below the value that it would judge.
 fn switched_on<D: Drive>(trials: &Trials<'_, D>, info: &SettingInfo, from: f64) -> Option<Value> {
     let evidence = trials.base.recorded.template()?;
     let value = match info.key.as_str() {
@@ -64,7 +64,7 @@ fn in_domain(info: &SettingInfo, value: f64) -> Option<Value> {
     }
 }
 
-/// The limits of all failed criteria, where they are several and belong to several settings.
+/// Changes of the limits of all failed gates; `None` unless they belong to several settings.
 pub(super) fn combined<D: Drive>(trials: &Trials<'_, D>) -> Option<Vec<SettingChange>> {
     if trials.goal != Goal::Accepted {
         return None;
@@ -93,7 +93,7 @@ pub(super) fn combined<D: Drive>(trials: &Trials<'_, D>) -> Option<Vec<SettingCh
     (changes.len() > 1).then_some(changes)
 }
 
-/// The finding of several limits together.
+/// The finding with several changed limits; `None` if the goal is not reached.
 pub(super) fn together<D: Drive>(
     trials: &mut Trials<'_, D>,
     changes: &[SettingChange],
@@ -106,7 +106,7 @@ pub(super) fn together<D: Drive>(
         let info = table.iter().find(|info| info.key == change.setting);
         info.map_or(1.0, |info| relative(info, &change.from, &change.to))
     };
-    // Several changes are as large as their sum.
+    // The size of several changes is the sum of their sizes.
     let total = changes.iter().map(size).sum();
     let runs = trials.runs - before;
     Ok(Some(trials.finding(changes.to_vec(), None, total, (&trace, runs))))

@@ -1,11 +1,11 @@
-//! A change with a margin: the smallest one that turns a step leaves its peak or value at the limit.
+//! A change with a margin: the smallest change that reaches the goal leaves the peak or value at the limit.
 //!
 //! | setting | with margin |
 //! |---|---|
-//! | `search_window_px` | the peak half a template, or an eighth of the window, farther from the rim |
+//! | `search_window_px` | the peak is half a template, or an eighth of the window, farther from the edge |
 //! | other numbers | a quarter more than the smallest change |
 //!
-//! Both end at the range of the setting, and are verified: with the margin the step must come out at least as good.
+//! Both are clamped to the range of the setting, and verified: the outcome with the margin must be at least as good.
 
 use serde_json::{Value, json};
 
@@ -17,10 +17,10 @@ use crate::track::Drive;
 use sightline_geometry::error::Result;
 use sightline_track::limits::{Domain, SettingInfo};
 
-/// The share by which a change grows.
+/// The fraction by which a change grows.
 const GROWTH: f64 = 0.25;
 
-/// The change with a margin, where the step comes out as good as `trace` with it.
+/// The change with a margin; `None` if its outcome is worse than that of `trace`.
 pub(super) fn of<D: Drive>(
     trials: &mut Trials<'_, D>,
     info: &SettingInfo,
@@ -37,7 +37,7 @@ pub(super) fn of<D: Drive>(
     Ok(found.map(|(to, _)| SettingChange { to, ..change.clone() }))
 }
 
-/// The value with the margin; `None` for words, switches and the end of the range.
+/// The value with the margin; `None` for words, switches, and at the end of the range.
 fn wider(info: &SettingInfo, from: &Value, to: &Value, template_px: f64) -> Option<Value> {
     let (from, to) = (from.as_f64()?, to.as_f64()?);
     match info.domain {

@@ -2,30 +2,30 @@
 //! accepted (R93, R97; ours).
 //!
 //! ```text
-//! recorded step ──► goal ──► candidates: settings that tracker and stage use ──► search ──► the step, really run ──► finding
-//!                        ├─► the prediction, moved to where the match is ──────┤
-//!                        └─► the prediction, where visual odometry puts it ────┘
+//! recorded step ──► goal ──► candidates: settings that tracker and stage use ──► search ──► step, recomputed ──► finding
+//!                        ├─► the prediction, moved towards the match ──────────┤
+//!                        └─► the prediction by visual odometry ────────────────┘
 //! ```
 //! | the recorded step | the goal |
 //! |---|---|
 //! | lost or failed | it is accepted |
-//! | accepted, yet false against the truth | it is rejected, or accepted and right |
+//! | accepted, but false tracking | it is rejected, or accepted and right |
 //!
-//! Every finding was verified by computing the step with it (`track::NextStep`), and says whether the result is
-//! right where the truth is known: an acceptance that is false tracking is said plainly and comes last. Of a setting with
-//! which a small change accepts a wrong match and a larger one the right match, the larger one is the finding.
+//! Every finding is verified by computing the step with it (`track::NextStep`). If the truth is known, the finding reports
+//! whether the result is right; false tracking is listed last. If a small change of a setting accepts a wrong match and a
+//! larger one the right match, the larger one is the finding.
 //!
-//! *Smallest* is meant within the grid of the setting (whole or odd numbers), and to two hundredths of the change for real
-//! numbers, then rounded away from the present value to a sensible digit. The search doubles the change until the step
-//! turns, in both directions at once, and halves the bracket: where acceptance comes and goes within a doubling, an
-//! earlier turn can be missed. The limit of a failed criterion has an exact answer instead, the value that failed.
+//! *Smallest* means: within the grid of the setting (whole or odd numbers), and to 2 % of the change for real numbers, then
+//! rounded away from the current value to few digits. The search doubles the change until the goal is reached, in both
+//! directions at once, and bisects the bracket. If acceptance begins and ends within one doubling, a smaller change can be
+//! missed. The limit of a failed gate has an exact answer instead, the value that failed.
 //!
-//! `relative` is the change over the present value; where that is 0, over the width of the setting's range; 1 for
-//! switches and words; for the prediction its way over half the search window.
+//! `relative` is the change over the current value; if that is 0, over the width of the setting's range; 1 for
+//! switches and words; for the prediction its displacement over half the search window.
 //!
-//! The smallest change leaves the step at the edge of being lost again: `with_margin` is a larger one, verified too.
+//! The smallest change leaves the step close to being lost again: `with_margin` is a larger change, also verified.
 //!
-//! No clock, no chance: the same step gives the same findings.
+//! The findings are deterministic: they depend on neither time nor random numbers.
 
 mod by_vision;
 mod candidates;
@@ -55,7 +55,7 @@ use sightline_track::limits::SettingInfo;
 use sightline_track::settings::Changes;
 use sightline_track::target::TrackingState;
 
-/// What a change is to bring about.
+/// The goal of a change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Goal {
@@ -65,14 +65,14 @@ pub enum Goal {
     NotFalse,
 }
 
-/// What came of a change, best first.
+/// The outcome of a change, best first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = CounterfactualOutcome)]
 pub enum Outcome {
     /// Accepted, and right against the truth.
     Right,
-    /// Rejected, as false tracking should be.
+    /// Rejected, which is right for false tracking.
     Rejected,
     /// Accepted; the truth is not known.
     Unknown,
@@ -88,54 +88,54 @@ pub struct SettingChange {
     /// The value in the run.
     #[schema(value_type = Value)]
     pub from: Value,
-    /// The value with which the step turns.
+    /// The value with which the goal is reached.
     #[schema(value_type = Value)]
     pub to: Value,
     /// Its unit, empty for pure numbers.
     pub unit: String,
 }
 
-/// A prediction that is put elsewhere in the left image.
+/// A displaced prediction in the left image.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Moved {
-    /// Where the run had it, px.
+    /// The prediction of the run, px.
     pub from: Pixel,
-    /// Where it is put, px.
+    /// The displaced prediction, px.
     pub to: Pixel,
-    /// How it was known where to, as a clause.
+    /// The source of the new position, as a clause.
     pub because: String,
 }
 
-/// A change with which the step turns, verified.
+/// A change with which the goal is reached, verified.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Finding {
-    /// The settings that change: one; several where no single limit suffices; none where the prediction moves.
+    /// The changed settings: one; several if no single limit suffices; none if the prediction moves.
     pub changes: Vec<SettingChange>,
-    /// The prediction that moves.
+    /// The displaced prediction; null if settings change.
     pub moved: Option<Moved>,
-    /// The same setting with a margin beyond the smallest change, verified; `None` where no such value is as good.
+    /// The same setting with a margin beyond the smallest change, verified; null if no such value is as good.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub with_margin: Option<SettingChange>,
-    /// The size of the change (see the module).
+    /// The change over the current value of the setting; for the prediction, its displacement over half the search window.
     pub relative: f64,
-    /// What came of it.
+    /// The outcome.
     pub outcome: Outcome,
-    /// The criterion that failed worst in the recorded step.
+    /// The gate that failed by the largest margin in the recorded step.
     pub gate: Option<String>,
-    /// Its unit.
+    /// The unit of that gate.
     pub gate_unit: String,
-    /// Its margin with the change, in its unit.
+    /// The margin of that gate with the change, in `gate_unit`.
     pub margin_after: Option<f64>,
-    /// The step with the change, as one line.
+    /// The row of the step with the change.
     pub row: StepRow,
-    /// How many times the step was computed for it.
+    /// Number of times the step was computed to find it.
     pub runs: usize,
-    /// All of this as one sentence.
+    /// The finding as one sentence.
     pub sentence: String,
 }
 
 impl Finding {
-    /// The change as it is tried at the step, or branched.
+    /// The change as a what-if of the step, or for a new branch.
     pub fn what_if(&self) -> WhatIf {
         let changes = self.changes.iter().map(|change| (change.setting.clone(), change.to.clone()));
         WhatIf {
@@ -146,29 +146,29 @@ impl Finding {
     }
 }
 
-/// How far the question is answered.
+/// The answer so far: the progress of the search and its findings.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Answer {
-    /// What was looked for.
+    /// The goal of the search.
     pub goal: Goal,
-    /// Settings and places looked at.
+    /// Candidates examined.
     pub k: usize,
-    /// How many there are.
+    /// Candidates in all.
     pub n: usize,
-    /// What is looked at now; empty at the end.
+    /// The candidate being examined; empty at the end.
     pub doing: String,
-    /// How many times the step was computed.
+    /// Number of times the step was computed.
     pub runs: usize,
-    /// What was found: right first, then the smallest change.
+    /// The findings: by outcome, best first, then by size.
     pub findings: Vec<Finding>,
-    /// What was looked at without success: settings by name, `prediction` and `visual odometry`.
+    /// The candidates without success: settings by name, `limits together`, `prediction` and `visual odometry`.
     pub without: Vec<String>,
 }
 
-/// What is asked about a step.
+/// The goal of a counterfactual for a step.
 ///
 /// # Errors
-/// [`Error::Request`] with the sentence that says why there is nothing to ask.
+/// [`Error::Request`] with the reason why the step has no counterfactual.
 pub fn goal(base: &Base<'_>) -> Result<Goal> {
     let step = base.recorded.step;
     let refuse = |why: String| Err(Error::Request(why));
@@ -202,10 +202,10 @@ pub fn goal(base: &Base<'_>) -> Result<Goal> {
     }
 }
 
-/// Looks for the changes with which the step turns; `on` hears of every one as it is found.
+/// Searches for the changes that reach the goal; calls `on` with the answer so far after each candidate.
 ///
 /// # Errors
-/// Those of [`goal`]; [`Error::Cancelled`] soon after `cancel` is set.
+/// As [`goal`]; [`Error::Cancelled`] soon after `cancel` is set.
 pub fn look<D: Drive>(
     drive: &D,
     base: Base<'_>,
@@ -273,7 +273,7 @@ impl Answer {
     }
 }
 
-/// The smallest change of one setting.
+/// Finds the smallest change of one setting.
 fn one_setting<D: Drive>(trials: &mut Trials<'_, D>, info: &SettingInfo) -> Result<Option<Finding>> {
     trials.check()?;
     let before = trials.runs;
@@ -291,7 +291,7 @@ fn one_setting<D: Drive>(trials: &mut Trials<'_, D>, info: &SettingInfo) -> Resu
     Ok(Some(Finding { with_margin, ..finding }))
 }
 
-/// What of a recorded step and its truth a change turns.
+/// The changed settings by name, with their new values.
 fn changes_of(changes: &[SettingChange]) -> Changes {
     changes.iter().map(|change| (change.setting.clone(), change.to.clone())).collect()
 }

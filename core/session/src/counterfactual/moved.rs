@@ -1,5 +1,5 @@
-//! The prediction, moved to where the match is: to the truth where that is known, else to the best match of the whole
-//! image; and then only so far on that way as is needed.
+//! Tries a displaced prediction: on the line towards the truth, or, without success there, towards the best match in the
+//! whole image. The smallest displacement on that line that reaches the goal is the finding.
 
 use super::trials::{Reach, Trials};
 use super::{Finding, Moved};
@@ -11,10 +11,10 @@ use sightline_track::limits::Domain;
 use sightline_track::locate::Evidence;
 use sightline_track::settings::{Changes, Settings};
 
-/// How narrow the bracket of the way becomes, px.
+/// The width of the bracket at which the bisection ends, px.
 const BRACKET_PX: f64 = 0.25;
 
-/// The shortest way with which the step turns.
+/// Finds the smallest displacement that reaches the goal.
 pub(super) fn look<D: Drive>(trials: &mut Trials<'_, D>) -> Result<Option<Finding>> {
     let recorded = trials.base.recorded;
     let Some(from) = recorded.point_mast.predicted_left else {
@@ -44,7 +44,7 @@ pub(super) fn look<D: Drive>(trials: &mut Trials<'_, D>) -> Result<Option<Findin
     }))
 }
 
-/// The best match of the whole image, with how that is known.
+/// The best match in the whole image, and its source as a clause.
 fn found_far<D: Drive>(trials: &mut Trials<'_, D>) -> Result<Option<(Pixel, String)>> {
     let recorded = trials.base.recorded;
     let is_template = recorded.located().is_some_and(|l| matches!(l.evidence, Evidence::Template(_)));
@@ -58,7 +58,8 @@ fn found_far<D: Drive>(trials: &mut Trials<'_, D>) -> Result<Option<(Pixel, Stri
     Ok(matched.map(|matched| (matched.pixel, because())))
 }
 
-/// The side of a search window that holds the whole left image, as far as the setting goes, px.
+/// The side of a search window that contains the whole left image, limited by the range of the setting, px. `None` if the
+/// window is not larger than the current one.
 fn widest_window(settings: &Settings, recorded: &RunStep) -> Option<u32> {
     let [width, height] = recorded.capture()?.left_size;
     let table = Settings::table();
@@ -68,10 +69,10 @@ fn widest_window(settings: &Settings, recorded: &RunStep) -> Option<u32> {
     (side > settings.template.search_window_px).then_some(side)
 }
 
-/// How near the end of a way comes, where it ends, and the step from there.
+/// The outcome of a displacement, the displaced prediction, and the step computed with it.
 type Way = (Reach, Pixel, RunStep);
 
-/// The first place on the way to `to` from which the step turns, with how near it comes; none where not even `to` does.
+/// Bisects `from → to` for the smallest displacement with the outcome of `to`; `None` if `to` does not reach the goal.
 fn on_the_way<D: Drive>(trials: &mut Trials<'_, D>, from: Pixel, to: Pixel) -> Result<Option<Way>> {
     let way_px = from.distance(to);
     let at = |share: f64| from.offset((to.x - from.x) * share, (to.y - from.y) * share);
@@ -92,7 +93,7 @@ fn on_the_way<D: Drive>(trials: &mut Trials<'_, D>, from: Pixel, to: Pixel) -> R
     Ok(Some((wanted, found.0, found.1)))
 }
 
-/// A tenth of a pixel is as finely as a person puts a prediction.
+/// Rounds to 0.1 px, the precision at which a person sets a prediction.
 fn rounded(pixel: Pixel) -> Pixel {
     Pixel::new((pixel.x * 10.0).round() / 10.0, (pixel.y * 10.0).round() / 10.0)
 }

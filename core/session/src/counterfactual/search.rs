@@ -1,4 +1,4 @@
-//! The search for the smallest change of one setting: doubling until the step turns, then halving.
+//! The search for the smallest change of one setting: doubling until the goal is reached, then bisection.
 
 use std::collections::BTreeMap;
 
@@ -11,25 +11,25 @@ use sightline_geometry::error::Result;
 use sightline_track::limits::{Domain, SettingInfo};
 use sightline_track::settings::Changes;
 
-/// The first change of a real number, as a share of its value.
+/// The first change of a real number, as a fraction of its value.
 const FIRST_SHARE: f64 = 0.01;
-/// The first change of a real number that is 0, as a share of its range.
+/// The first change of a real number that is 0, as a fraction of its range.
 const FIRST_OF_RANGE: f64 = 1e-4;
-/// How often a change is doubled before the end of the range is tried.
+/// Number of doublings before the end of the range is tried.
 const DOUBLINGS: u32 = 16;
-/// How narrow the bracket of a real number becomes, as a share of the change.
+/// The width of the bracket of a real number at which the bisection ends, as a fraction of the change.
 const BRACKET: f64 = 0.02;
 
 /// A value of a setting with the step that was computed with it.
 pub(super) type Verified = (Value, RunStep);
 
-/// The values that a numeric setting may take about its present one.
+/// The values that a numeric setting may take, relative to its current value.
 #[derive(Clone, Copy, Debug)]
 struct Grid {
     from: f64,
     low: f64,
     high: f64,
-    /// Distance of neighbouring values; 0: real numbers.
+    /// Distance of neighbouring values; 0 for real numbers.
     pitch: f64,
 }
 
@@ -50,7 +50,7 @@ impl Grid {
         }
     }
 
-    /// The changes to try in a direction (+1 or −1), growing, the end of the range last.
+    /// The sizes of the changes to try in a direction (+1 or −1), ascending; the end of the range is last.
     fn changes(&self, direction: f64) -> Vec<f64> {
         let end = if direction > 0.0 { self.high - self.from } else { self.from - self.low };
         let first = match (self.pitch > 0.0, self.from == 0.0) {
@@ -72,17 +72,17 @@ impl Grid {
     }
 }
 
-/// What was tried of one setting.
+/// The trials of one setting.
 struct Probe<'p, 'a, D: Drive> {
     trials: &'p mut Trials<'a, D>,
     info: &'p SettingInfo,
     grid: Grid,
-    /// By the bits of the signed change.
+    /// The outcomes by the bits of the signed change.
     known: BTreeMap<u64, Reach>,
 }
 
 impl<D: Drive> Probe<'_, '_, D> {
-    /// How near a signed change comes.
+    /// The outcome of a signed change; each is computed once.
     fn reach(&mut self, change: f64) -> Result<Reach> {
         let key = change.to_bits();
         if let Some(known) = self.known.get(&key) {
@@ -101,7 +101,8 @@ impl<D: Drive> Probe<'_, '_, D> {
         Ok(reach)
     }
 
-    /// The template tracker's limits change nothing before `judge`, so that asking it again says the same.
+    /// The outcome by repeating `judge` alone, for limits of the template tracker, which influence no other stage.
+    /// `None` for other settings.
     fn rejudged(&self, changes: &Changes) -> Option<Reach> {
         let is_limit = self.info.group == "limits";
         let is_template = matches!(
@@ -112,7 +113,7 @@ impl<D: Drive> Probe<'_, '_, D> {
         self.trials.rejudged(&settings.limits)
     }
 
-    /// The first changes in growing order, in both directions at once, that come at least so near.
+    /// The brackets of the smallest changes with at least this outcome, in both directions at once; empty if there are none.
     fn brackets(&mut self, wanted: Reach) -> Result<Vec<[f64; 2]>> {
         let ways = [1.0, -1.0].map(|direction| (direction, self.grid.changes(direction)));
         let rounds = ways.iter().map(|(_, changes)| changes.len()).max().unwrap_or(0);
@@ -132,7 +133,7 @@ impl<D: Drive> Probe<'_, '_, D> {
         Ok(Vec::new())
     }
 
-    /// Halves a bracket from a change that does not come so near to one that does.
+    /// Bisects a bracket between a change without the wanted outcome and one with it.
     fn halved(&mut self, [mut not, mut does]: [f64; 2], wanted: Reach) -> Result<[f64; 2]> {
         let pitch = self.grid.pitch;
         loop {
@@ -148,7 +149,7 @@ impl<D: Drive> Probe<'_, '_, D> {
     }
 }
 
-/// The smallest change of a setting with which the step turns.
+/// Finds the smallest change of a setting that reaches the goal.
 pub(super) fn smallest<D: Drive>(
     trials: &mut Trials<'_, D>,
     info: &SettingInfo,
@@ -156,7 +157,7 @@ pub(super) fn smallest<D: Drive>(
 ) -> Result<Option<Verified>> {
     if let Some(grid) = Grid::of(info, from) {
         let mut probe = Probe { trials, info, grid, known: BTreeMap::new() };
-        // An acceptance that is false stands only where no change leads to a right one.
+        // A false acceptance counts only if no change leads to a right one.
         for wanted in [Reach::Yes, Reach::ButFalse] {
             let brackets = probe.brackets(wanted)?;
             let halved: Vec<[f64; 2]> =
@@ -184,7 +185,7 @@ pub(super) fn smallest<D: Drive>(
     Ok(best.map(|(_, verified)| verified))
 }
 
-/// The round number of a bracket, verified; else its far end.
+/// The roundest number of a bracket, verified; else its outer end.
 fn settle<D: Drive>(
     probe: &mut Probe<'_, '_, D>,
     not: f64,
@@ -204,7 +205,7 @@ fn settle<D: Drive>(
     Ok(None)
 }
 
-/// A value with its step, where that turns.
+/// Computes the step with a value; `None` if the goal is not reached.
 pub(super) fn verified<D: Drive>(
     trials: &mut Trials<'_, D>,
     info: &SettingInfo,
@@ -214,8 +215,8 @@ pub(super) fn verified<D: Drive>(
     Ok(tried.filter(|trace| trials.reach(trace) > Reach::Not).map(|trace| (value, trace)))
 }
 
-/// The number with the fewest digits from beyond `not` to `does`, which lies farther from `from`; where both ends are the
-/// same side of it, rounded away from `from` by at most a tenth of the change.
+/// The number with the fewest digits between `not` (excluded) and `does`, the end farther from `from`, or beyond `does` by
+/// at most a tenth of the change. If `not` equals `from`, only numbers from `does` outward count.
 pub(super) fn round_outward(from: f64, not: f64, does: f64) -> f64 {
     let change = (does - from).abs();
     if change == 0.0 || !change.is_finite() {
@@ -225,7 +226,7 @@ pub(super) fn round_outward(from: f64, not: f64, does: f64) -> f64 {
     for digits in -6..=12 {
         let unit = 10f64.powi(-digits);
         let multiple = if outward > 0.0 { (does / unit).ceil() } else { (does / unit).floor() };
-        // Dividing by a whole power gives the nearest number to what is written.
+        // Dividing by a power of ten gives the float nearest to the decimal number.
         let rounded = if digits > 0 { multiple / 10f64.powi(digits) } else { multiple * unit };
         let inward = if outward > 0.0 { (does / unit).floor() } else { (does / unit).ceil() };
         let inward = if digits > 0 { inward / 10f64.powi(digits) } else { inward * unit };
@@ -239,7 +240,7 @@ pub(super) fn round_outward(from: f64, not: f64, does: f64) -> f64 {
     does
 }
 
-/// The size of a change over the present value; over the range where that is 0; 1 for switches and words.
+/// The size of a change over the current value; over the range if that is 0; 1 for switches and words.
 pub(super) fn relative(info: &SettingInfo, from: &Value, to: &Value) -> f64 {
     let (Some(from), Some(to)) = (from.as_f64(), to.as_f64()) else { return 1.0 };
     let range = match info.domain {

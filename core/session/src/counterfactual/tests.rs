@@ -1,4 +1,4 @@
-//! Steps of a world whose truth is a formula, lost for a known reason: the counterfactual must name it.
+//! Steps of an analytic world that are lost for a known reason: the counterfactual must find it.
 
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
@@ -22,7 +22,7 @@ use sightline_track::target::Designation;
 use sightline_track::trace::StepKind;
 use sightline_world::target_truth::TruthSource;
 
-/// The step that goes wrong.
+/// The step that is lost.
 const STEP: usize = 2;
 
 fn settings(changes: &[(&str, Value)]) -> Settings {
@@ -37,7 +37,7 @@ fn world(jump_m: f64) -> PlaneWorld {
     world
 }
 
-/// The world with its pictures kept: a question looks at the same two again and again.
+/// The world with a cache of its images, because a search uses the same two pairs repeatedly.
 struct Rendered {
     world: PlaneWorld,
     pairs: Vec<OnceLock<StereoPair>>,
@@ -170,7 +170,7 @@ fn a_window_too_small_for_a_displaced_prediction_is_answered_by_the_least_window
     let wide_px = wide.template().unwrap().match_template.as_ref().unwrap().edge_distance_px.unwrap();
     assert_eq!(wide.truth.as_ref().unwrap().tracked, Some(true));
     assert!(wide_px >= 10.0, "the peak is half a template from the rim: {wide_px} px at {margin:?}");
-    // What was verified is what the step really does.
+    // The verified row equals that of the recomputed step.
     let again = try_step(&staged.world, staged.base(), &finding.what_if(), Cancel::default()).unwrap();
     assert_eq!(again.row(), finding.row);
 }
@@ -183,8 +183,7 @@ fn the_prediction_need_only_move_until_the_match_is_in_the_window() {
     let moved = finding.moved.as_ref().unwrap();
     let truth = staged.steps[STEP].truth.as_ref().unwrap().left_pixel.unwrap();
     assert!(moved.from.distance(moved.to) < moved.from.distance(truth));
-    // The window is a square that reaches 20 px from where the prediction now lies, and a match counts as right that
-    // lies within the tolerance of R116.
+    // The search window extends 20 px from the displaced prediction; a match within the tolerance of R116 counts as right.
     let tolerance_px = staged.steps[STEP].truth.as_ref().unwrap().tolerance_px;
     let left_px = (truth.x - moved.to.x).abs().max((truth.y - moved.to.y).abs());
     assert!((19.0..20.5 + tolerance_px).contains(&left_px), "{left_px} px are left, {tolerance_px} allowed");
@@ -216,7 +215,7 @@ fn a_slip_that_odometry_would_have_seen_is_answered_by_the_place_where_it_puts_t
     assert!(moved.from.distance(truth) > 30.0 && moved.to.distance(truth) < 1.5, "{moved:?} {truth:?}");
     assert_eq!(finding.outcome, Outcome::Right);
     assert!(finding.sentence.contains("which is off in this drive"), "{}", finding.sentence);
-    // A refused motion names its gate; a correction of the pose leaves nothing to ask.
+    // A refused motion is reported with its gate; for a corrected pose this candidate does not apply.
     let mut refused = staged;
     let how = (OdometryMode::Full, OdometryPreset::Sightline);
     let mut measured = MeasuredMotion::measure(&refused.world, STEP, None, how, Cancel::default()).unwrap();
@@ -243,7 +242,7 @@ fn a_limit_too_strict_is_answered_by_the_value_that_failed_rounded_to_the_loose_
     assert!(to <= ncc && ncc - to <= 0.1 * (0.9999 - ncc), "{to} for {ncc}");
     assert_eq!((finding.outcome, finding.runs), (Outcome::Right, 2));
     assert!((finding.margin_after.unwrap() - (ncc - to)).abs() < 1e-12);
-    // It is the smallest change of all that are right.
+    // It is the smallest of all right changes.
     assert_eq!(finding_of.findings[0], *finding);
 }
 
@@ -256,7 +255,7 @@ fn a_tolerance_too_strict_is_answered_by_its_factor() {
     let to = of(&answer, "tolerance_factor").changes[0].to.as_f64().unwrap();
     let exact = 0.3 * gate.value.unwrap() / gate.limit;
     assert!(to >= exact && to - exact <= 0.1 * (exact - 0.3), "{to} for {exact}");
-    // The same by a term of the tolerance, which is searched for.
+    // A term of the tolerance has the same effect, but must be searched for.
     let fraction = of(&answer, "disparity_error_px").changes[0].to.as_f64().unwrap();
     assert!(is_accepted(&staged.with("disparity_error_px", json!(fraction))));
     assert!(!is_accepted(&staged.with("disparity_error_px", json!(1.0 + 0.8 * (fraction - 1.0)))));

@@ -1,4 +1,4 @@
-//! Trials of a step: each computes it with a change and says what came of it.
+//! Trials of a step: each computes the step with a change and classifies the outcome.
 
 use std::sync::atomic::AtomicBool;
 
@@ -14,25 +14,25 @@ use sightline_track::limits::Limits;
 use sightline_track::settings::Changes;
 use sightline_track::stages::judge;
 
-/// How near a trial came to the goal.
+/// Whether a trial reached the goal; better outcomes are greater.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Reach {
-    /// Not there.
+    /// The goal is not reached.
     Not,
     /// Accepted, but false against the truth.
     ButFalse,
-    /// There.
+    /// The goal is reached.
     Yes,
 }
 
-/// Computes a step again and again.
+/// Computes a step with changes, and counts the computations.
 pub(super) struct Trials<'a, D: Drive> {
     drive: &'a D,
-    /// From what.
+    /// The recorded step, its predecessors and settings.
     pub base: Base<'a>,
-    /// To what end.
+    /// The goal.
     pub goal: Goal,
-    /// How many times so far.
+    /// Number of computations so far.
     pub runs: usize,
     cancel: Cancel<'a>,
 }
@@ -42,17 +42,17 @@ impl<'a, D: Drive> Trials<'a, D> {
         Self { drive, base, goal, runs: 0, cancel: cancel.into() }
     }
 
-    /// Where the step is.
+    /// The drive that contains the step.
     pub(super) const fn drive(&self) -> &'a D {
         self.drive
     }
 
-    /// Ends the search once it was cancelled.
+    /// Fails if the search was cancelled.
     pub(super) fn check(&self) -> Result<()> {
         self.cancel.check()
     }
 
-    /// The step with changes; none where they are no settings.
+    /// Computes the step with changes; `None` if a changed setting is invalid.
     pub(super) fn run(&mut self, changes: &Changes, prediction_px: Option<Pixel>) -> Result<Option<RunStep>> {
         self.check()?;
         self.runs += 1;
@@ -63,13 +63,13 @@ impl<'a, D: Drive> Trials<'a, D> {
         }
     }
 
-    /// How near a computed step came.
+    /// The outcome of a computed step.
     pub(super) fn reach(&self, trace: &RunStep) -> Reach {
         let tracked = trace.truth.as_ref().and_then(|truth| truth.tracked);
         self.reach_of(is_accepted(trace), tracked)
     }
 
-    /// How near the recorded match would come under other limits; the stage `judge` alone is asked.
+    /// The outcome of the recorded match under other limits, by repeating the stage `judge` alone.
     pub(super) fn rejudged(&self, limits: &Limits) -> Option<Reach> {
         let trace = self.base.recorded;
         let verdict = judge::judge(
@@ -95,13 +95,13 @@ impl<'a, D: Drive> Trials<'a, D> {
         }
     }
 
-    /// The gate that failed worst in the recorded step.
+    /// The gate that failed by the largest margin in the recorded step.
     pub(super) fn worst_gate(&self) -> Option<Margin<'a>> {
         let verdict = self.base.recorded.verdict()?;
         gates::by_margin(&verdict.gates).into_iter().find(|margin| !margin.gate.passed)
     }
 
-    /// What a change brought, in words and numbers.
+    /// The finding of a change and the step computed with it.
     pub(super) fn finding(
         &self,
         changes: Vec<SettingChange>,

@@ -1,36 +1,36 @@
-//! What page and server say to each other about counterfactuals.
+//! The messages about counterfactuals that server and viewer exchange.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::Answer;
 
-/// How a question stands.
+/// The state of the search for a counterfactual.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum QuestionState {
-    /// Nobody has asked.
+    /// It was not requested.
     Unasked,
-    /// Others come first.
+    /// It waits for other searches.
     Waiting,
-    /// It is being answered.
+    /// It is in progress.
     Running,
-    /// It is answered.
+    /// It is complete.
     Done,
-    /// It was cancelled; what was found is kept.
+    /// It was cancelled; the findings so far are kept.
     Cancelled,
-    /// It could not go on.
+    /// It failed.
     Failed,
 }
 
 impl QuestionState {
-    /// Whether nothing more comes.
+    /// Whether no search is waiting or in progress.
     pub const fn is_over(self) -> bool {
         !matches!(self, Self::Waiting | Self::Running)
     }
 }
 
-/// What would have saved a step: the question with its answer so far.
+/// A counterfactual of a step: the state of the search and the answer so far.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Question {
     /// The session.
@@ -41,10 +41,10 @@ pub struct Question {
     pub run: usize,
     /// The step.
     pub step: usize,
-    /// How it stands.
+    /// The state of the search.
     pub state: QuestionState,
-    /// What was found so far; null before it was begun.
+    /// The answer so far; null before the search begins.
     pub answer: Option<Answer>,
-    /// Why it failed, as one sentence.
+    /// Why it failed, as one sentence; null otherwise.
     pub problem: Option<String>,
 }

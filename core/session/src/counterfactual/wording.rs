@@ -7,7 +7,7 @@ use crate::step::RunStep;
 use crate::why::gates::label;
 use crate::why::words::{number, setting_name, signed};
 
-/// What changes, what came of it, and how sure that is.
+/// States the changes, the outcome, and the margin of the worst gate.
 pub(super) fn sentence(finding: &Finding, trace: &RunStep) -> String {
     let mut what: Vec<String> = finding
         .changes

@@ -1,4 +1,4 @@
-//! What the functions of an expression mean: what each is given, and in which unit its value is.
+//! Checks calls of functions: their arguments, and the unit of their value.
 
 use std::ops::Range;
 
@@ -63,7 +63,7 @@ impl Checker<'_> {
                 kind = next.1;
                 continue;
             }
-            // What came before is of one unit; the scale of a bare number goes to all of it.
+            // The earlier arguments have one unit; if they were bare numbers, they all take the unit of this one.
             let was_bare = kind == Type::Bare;
             let before = (Code::Constant(Value::Missing), kind);
             let (_, code, joined) = self.alike((&given[0], before), (node, next), name, span)?;
@@ -150,7 +150,7 @@ impl Checker<'_> {
         Ok(Checked { code: Code::Differs { runs, of: Box::new(of.code), beyond }, kind: Type::Truth })
     }
 
-    /// By how much a value must differ, in base units.
+    /// The tolerance of `differs`, in base units.
     fn tolerance(&mut self, node: &Node, of: &Node, kind: &Type) -> Result<f64, Refused> {
         if !matches!(kind, Type::Bare | Type::Number(_)) {
             let (found, what) = (self.source(of), kind.in_words());

@@ -1,5 +1,5 @@
-//! The catalogue of names: what an expression can speak of, with unit, meaning and stage. It drives checking, completion
-//! and documentation.
+//! The catalogue of names that an expression can use, with unit, meaning and stage; the basis of checking, completion and
+//! documentation.
 //!
 //! A name is looked up among the short names, then the columns of [`StepRow`], then the fields of [`RunStep`], then the
 //! quantities that the stages declare.
@@ -19,7 +19,7 @@ use crate::step::{RunStep, StepRow};
 use sightline_record::GateDecl;
 use sightline_track::target::TrackingState;
 
-/// Short names of quantities with their paths in the record, which give unit and meaning.
+/// Short names of quantities, and their paths in the record, which determine unit and meaning.
 pub(super) const SHORT: [(&str, &str); 11] = [
     ("peak_ratio", "locate.evidence.match_template.second_peak.ratio"),
     ("peak_distance_px", "locate.evidence.match_template.second_peak.distance_px"),
@@ -43,7 +43,7 @@ fn gate_names() -> Vec<String> {
     gates().iter().map(|gate| gate.name.to_string()).collect()
 }
 
-/// What a name stands for.
+/// The kind of value that a name denotes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum NameKind {
@@ -53,9 +53,9 @@ pub enum NameKind {
     Truth,
     /// A word or a text.
     Word,
-    /// A list: one of its entries is named by `[0]`, their number by `count(…)`.
+    /// A list: `[0]` names its first entry, `count(…)` is the number of entries.
     List,
-    /// What has fields.
+    /// A record with fields.
     Record,
 }
 
@@ -64,57 +64,57 @@ pub enum NameKind {
 pub struct Name {
     /// The name or path.
     pub name: String,
-    /// What it stands for.
+    /// The kind of its value.
     pub kind: NameKind,
     /// Its unit; empty without one.
     pub unit: String,
-    /// What it means.
+    /// Its meaning, as one sentence.
     pub meaning: String,
-    /// The stage that makes it; `row` for a column of the run.
+    /// The stage that computes it; `row` for a column of the run.
     pub stage: String,
-    /// The words that it can be, where they are known.
+    /// The possible words; empty if unknown.
     pub words: Vec<String>,
 }
 
-/// Where the path of a name begins.
+/// The root of a name's path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Root {
-    /// In the row of the step.
+    /// The row of the step.
     Row,
-    /// In the step's record.
+    /// The step's record.
     Step,
-    /// In the quantities that a stage declares.
+    /// The quantities that the stages declare.
     Stage,
 }
 
-/// Where a name's value is found.
+/// The location of a name's value.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Place {
-    /// Where the way begins.
+    /// The root of the path.
     pub root: Root,
-    /// The way there.
+    /// The path from the root.
     pub path: Vec<Segment>,
 }
 
 /// A name that was looked up.
 pub(super) struct Found<'a> {
-    /// Where its value is.
+    /// The location of its value.
     pub place: Place,
-    /// What it is.
+    /// The kind of its value.
     pub shape: &'a Shape,
-    /// What it means.
+    /// Its meaning, as one sentence.
     pub meaning: &'a str,
-    /// The unit of a gate's values, which its record does not tell.
+    /// The unit of a gate's values, which the shape does not contain; `None` for other names.
     pub unit: Option<Unit>,
 }
 
-/// Why a name was not found: the segment at fault, and the names that were possible there.
+/// Why a name was not found: the segment at fault, and the possible names in its place.
 pub(super) struct Unknown {
-    /// Which segment of the path.
+    /// The index of the segment at fault.
     pub at: usize,
-    /// What could have stood there; empty where nothing can.
+    /// The possible names in its place; empty if there are none.
     pub possible: Vec<String>,
-    /// What stands before it, in words.
+    /// The path before it; `None` for the first segment.
     pub within: Option<String>,
 }
 
@@ -123,7 +123,7 @@ pub(super) struct Catalogue {
     row: BTreeMap<String, Entry>,
     record: BTreeMap<String, Entry>,
     stages: BTreeMap<String, Entry>,
-    /// The row as its columns are declared, below its own name.
+    /// The declared columns of the row, below the stage `step`.
     columns: BTreeMap<String, Entry>,
 }
 
@@ -165,14 +165,14 @@ impl Catalogue {
             return found.map_err(|wrong| Unknown { at: (wrong.at + 1).saturating_sub(added), ..wrong });
         }
         if self.row.contains_key(first) {
-            // A column, else a component that only its declaration names.
+            // A column, else a declared component.
             return self.walk(&self.row, path, Root::Row).or_else(|unknown| {
                 let whole: Vec<_> =
                     std::iter::once(Segment::Field(recorded::ROW.to_owned())).chain(path.to_vec()).collect();
                 self.walk(&self.columns, &whole, Root::Stage).map_err(|_| unknown)
             });
         }
-        // A field of the record, else a quantity that its stage computes.
+        // A field of the record, else a declared quantity.
         self.walk(&self.record, path, Root::Step).or_else(|unknown| {
             let declared = self.walk(&self.stages, path, Root::Stage);
             if self.record.contains_key(first) { declared.map_err(|_| unknown) } else { declared }
@@ -226,12 +226,12 @@ impl Catalogue {
         Ok(Found { place, shape: &entry.shape, meaning: &entry.meaning, unit })
     }
 
-    /// The names that can stand at a place; at the beginning all roots.
+    /// The possible names of a segment; all roots for the first one.
     fn possible(&self, at: usize, fields: &BTreeMap<String, Entry>) -> Vec<String> {
         if at > 0 { fields.keys().cloned().collect() } else { self.roots().map(|(name, _)| name).collect() }
     }
 
-    /// What an expression can begin a name with: short names, columns, stages.
+    /// The possible first segments, with their stages: columns, short names, fields and stages.
     fn roots(&self) -> impl Iterator<Item = (String, &str)> {
         let short = SHORT.iter().map(|(name, path)| {
             let stage = path.split('.').next().unwrap_or_default();
@@ -243,7 +243,7 @@ impl Catalogue {
         row.chain(short).chain(beyond.chain(stages).map(|name| (name.clone(), self.stage_word(name))))
     }
 
-    /// The names directly under a path, or the roots.
+    /// The names directly under a path; the roots for an empty path.
     pub(super) fn under(&self, path: &[Segment]) -> Vec<Name> {
         let joined = |name: String| {
             let field = Segment::Field(name);
@@ -263,7 +263,7 @@ impl Catalogue {
         below.iter().filter_map(|name| self.name(name, stage)).collect()
     }
 
-    /// A name with everything that is known of it.
+    /// A name with kind, unit, meaning and words.
     fn name(&self, name: &str, stage: &str) -> Option<Name> {
         let path = super::path_of(name)?;
         let found = self.find(&path).ok()?;
@@ -293,7 +293,7 @@ impl Catalogue {
         self.stages.get_key_value(field).map_or("step", |(stage, _)| stage)
     }
 
-    /// Every name: the roots and all that lies under them, lists by their first entry.
+    /// Every name: the roots and all names under them; of lists, the first entry.
     pub(super) fn all(&self) -> Vec<Name> {
         let mut names = Vec::new();
         let mut open: Vec<Name> = self.under(&[]);
@@ -308,17 +308,17 @@ impl Catalogue {
     }
 }
 
-/// The names that stand alone: columns, short names and stages.
+/// The names without a path: columns, short names and stages.
 pub fn short_names() -> Vec<Name> {
     CATALOGUE.under(&[])
 }
 
-/// Every name of the language, paths into records and lists included (those by their first entry).
+/// Every name of the language, including paths into records and lists (of lists, the first entry).
 pub(crate) fn all_names() -> Vec<Name> {
     CATALOGUE.all()
 }
 
-/// The place of a coordinate in a list of numbers.
+/// The index of a coordinate in a list of numbers.
 fn coordinate(name: &str) -> Option<usize> {
     ["x", "y", "z"].iter().position(|axis| *axis == name)
 }

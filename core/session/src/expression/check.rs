@@ -1,7 +1,7 @@
-//! What an expression means: every name is looked up, every unit compared, and the tree becomes what can be evaluated.
+//! Semantic analysis: looks up names, checks kinds and units, and compiles the tree to `Code`.
 //!
-//! A number without a unit takes the unit of what it stands beside (`roll_deg > 3` is 3 deg); a name without one does
-//! not: a score is compared with plain numbers only.
+//! A number without a unit takes the unit of the other operand (`roll_deg > 3` is 3 deg). A name without a unit does not: a
+//! score is compared with plain numbers only.
 
 use std::ops::Range;
 
@@ -14,25 +14,25 @@ use super::schema::Shape;
 use super::tree::{Kind, Node, Operator, Segment};
 use super::unit::Unit;
 
-/// What a part of an expression is.
+/// The type of a node.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Type {
-    /// A number that takes whatever unit it stands beside.
+    /// A number without a unit, which takes the unit of the other operand.
     Bare,
-    /// A number.
+    /// A number with its unit.
     Number(Unit),
     /// Yes or no.
     Truth,
-    /// A word, with those that it can be.
+    /// A word, with the possible words; empty if any.
     Word(Vec<String>),
     /// A list.
     List,
-    /// Something with fields.
+    /// A record with fields.
     Record,
 }
 
 impl Type {
-    /// As a part of a sentence.
+    /// The type as a part of a sentence.
     pub(super) fn in_words(&self) -> String {
         match self {
             Self::Bare => "a number".to_owned(),
@@ -45,7 +45,7 @@ impl Type {
     }
 }
 
-/// What was made of a node.
+/// The code and the type of a checked node.
 pub(super) struct Checked {
     pub code: Code,
     pub kind: Type,
@@ -53,11 +53,11 @@ pub(super) struct Checked {
 
 /// Checks a tree.
 pub(super) struct Checker<'a> {
-    /// The text that it was read from.
+    /// The source text.
     pub text: &'a str,
     /// The runs that are compared, by number.
     pub runs: Vec<usize>,
-    /// Whether a comparison of runs is being looked at.
+    /// Whether the node being checked is inside a call of `differs`.
     pub inside_differs: bool,
 }
 
@@ -110,7 +110,7 @@ impl Checker<'_> {
         Ok(Checked { code: Code::Read(found.place, per_base), kind })
     }
 
-    /// A condition.
+    /// Checks a node that must be a condition.
     fn truth(&mut self, node: &Node, by: &str) -> Result<Code, Refused> {
         let checked = self.check(node)?;
         if checked.kind == Type::Truth {
@@ -121,7 +121,7 @@ impl Checker<'_> {
         Err(Refused::at(self.text, node.span.clone(), sentence).hint("Compare it, for example with `<`."))
     }
 
-    /// Something to compute with.
+    /// Checks a node that must be a number.
     pub(super) fn number(&mut self, node: &Node, by: &str) -> Result<(Code, Type), Refused> {
         let checked = self.check(node)?;
         match checked.kind {
@@ -166,7 +166,7 @@ impl Checker<'_> {
         }
     }
 
-    /// Two numbers that must measure the same; a bare one takes the other's unit.
+    /// Checks that two numbers have the same dimension; a bare number takes the unit of the other.
     pub(super) fn alike(
         &self,
         (left, (a, of_a)): (&Node, (Code, Type)),
@@ -219,7 +219,7 @@ impl Checker<'_> {
         span: &Range<usize>,
     ) -> Result<Checked, Refused> {
         let (a, b) = match (self.word_of(left), self.word_of(right)) {
-            // A bare word has a meaning only beside something that is a word.
+            // A bare word is a constant only if the other operand is a word.
             (Some(word), None) => {
                 let b = self.check(right)?;
                 (self.bare_word(left, word, &b)?, b)
@@ -255,7 +255,7 @@ impl Checker<'_> {
         Ok(Checked { code, kind: Type::Truth })
     }
 
-    /// The word of a node that is no name of the catalogue.
+    /// The word of a node that is not a name of the catalogue.
     pub(super) fn word_of(&self, node: &Node) -> Option<String> {
         match &node.kind {
             Kind::Path(path) => match path.as_slice() {
@@ -278,7 +278,7 @@ impl Checker<'_> {
         self.refuse(&node.span, "unknown word".to_owned())
     }
 
-    /// A constant word must be one that the other side can be.
+    /// Checks that a constant word is a possible value of the other operand.
     fn check_word(&self, code: &Code, at: &Node, known: &[String], of: &Node) -> Result<(), Refused> {
         let Code::Constant(Value::Word(word)) = code else { return Ok(()) };
         if known.is_empty() || known.contains(word) {
@@ -305,7 +305,7 @@ fn number(value: f64, unit: Option<&str>) -> Checked {
     }
 }
 
-/// A bare number in the unit that it takes.
+/// A bare number, converted from the unit that it takes to base units.
 pub(super) fn scaled(code: Code, unit: &Unit) -> Code {
     if unit.per_base() == 1.0 { code } else { Code::Scaled(Box::new(code), unit.per_base()) }
 }

@@ -1,4 +1,4 @@
-//! Completion: what could be written at the cursor, each with unit and meaning.
+//! Completion: the candidates at the cursor, each with unit and meaning.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -9,33 +9,33 @@ use super::token::{Token, is_name, tokens};
 use super::unit::Unit;
 use super::{Answers, Expression, LENGTH_LIMIT};
 
-/// How many candidates are offered at a time.
+/// Maximum number of candidates.
 pub const CANDIDATES: usize = 12;
 
-/// Something that could be written.
+/// A candidate of a completion.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[schema(as = CompletionCandidate)]
 pub struct Candidate {
-    /// What would be written.
+    /// The text to insert.
     pub text: String,
     /// Its unit; empty without one.
     pub unit: String,
-    /// What it means.
+    /// Its meaning, as one sentence.
     pub meaning: String,
 }
 
-/// What could be written at a place.
+/// The candidates at a position.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct Completion {
-    /// The first character that it would replace, from 0.
+    /// The first character to replace, from 0.
     pub from: usize,
-    /// The first character after those.
+    /// The end of the range to replace (exclusive).
     pub to: usize,
     /// The candidates, the likeliest first.
     pub candidates: Vec<Candidate>,
 }
 
-/// What could be written at `cursor`, counted in characters.
+/// The candidates at `cursor`, counted in characters.
 pub fn complete(text: &str, cursor: usize) -> Completion {
     let characters: Vec<char> = text.chars().take(LENGTH_LIMIT).collect();
     let to = cursor.min(characters.len());
@@ -61,15 +61,15 @@ pub fn complete(text: &str, cursor: usize) -> Completion {
     Completion { from, to, candidates }
 }
 
-/// What belongs at a place.
+/// The kind of token that is expected at a position.
 enum Where {
-    /// Nothing that could be listed.
+    /// Nothing that can be listed.
     Nothing,
     /// A unit, after a number.
     Unit,
-    /// A word that this name can be.
+    /// A possible word of this name.
     Word(String),
-    /// What joins two values.
+    /// An operator.
     Joint,
     /// A value.
     Value,
@@ -79,7 +79,7 @@ fn place(before: &str, word: &str) -> Where {
     let Ok(tokens) = tokens(before) else { return Where::Nothing };
     let tokens: Vec<Token> = tokens.into_iter().map(|(token, _)| token).collect();
     if word.starts_with(|c: char| c.is_ascii_digit()) {
-        // `5c`: the number is written, and its unit begun.
+        // `5c`: a number with the beginning of its unit.
         return Where::Nothing;
     }
     let is_joint = |word: &str| matches!(word, "and" | "or" | "not");
@@ -95,7 +95,7 @@ fn place(before: &str, word: &str) -> Where {
     }
 }
 
-/// The name before a comparison, where it is one that is a word.
+/// The name before a comparison; `None` if its value is not a word.
 fn words_before(tokens: &[Token]) -> Option<String> {
     let is_part =
         |token: &&Token| matches!(token, Token::Name(_) | Token::Sign("." | "[" | "]") | Token::Number(_));
@@ -110,7 +110,7 @@ fn words_before(tokens: &[Token]) -> Option<String> {
     (!words_of(&name).is_empty()).then_some(name)
 }
 
-/// The words that a name can be.
+/// The possible words of a name.
 fn words_of(name: &str) -> Vec<String> {
     let Some(path) = super::path_of(name) else { return Vec::new() };
     match CATALOGUE.find(&path).map(|found| found.shape.clone()) {
@@ -119,7 +119,7 @@ fn words_of(name: &str) -> Vec<String> {
     }
 }
 
-/// The unit of what stands before a sign that takes one unit on both sides, where the text ends with such a sign.
+/// The unit of the left operand, if the text ends with an operator whose operands must have the same unit.
 fn compared(before: &str) -> Option<Unit> {
     const ALIKE: [&str; 8] = ["<", ">", "<=", ">=", "==", "!=", "+", "-"];
     let tokens = tokens(before).ok()?;
@@ -137,7 +137,7 @@ fn is_one_of(token: &Token, signs: &[&str]) -> bool {
     matches!(token, Token::Sign(sign) if signs.contains(sign))
 }
 
-/// Names and functions that begin as the word does, or hold it; numbers in a unit like this one come before the others.
+/// Names and functions that begin with the word or contain it; numbers of the same dimension as `unit` first.
 fn values(word: &str, unit: Option<&Unit>) -> Vec<Candidate> {
     let parent = word.rfind('.').map(|dot| &word[..dot]);
     if let Some(parent) = parent {
@@ -182,7 +182,7 @@ fn units() -> Vec<Candidate> {
     Unit::words().map(unit).collect()
 }
 
-/// What may follow a value.
+/// The operators that may follow a value.
 fn joints() -> Vec<Candidate> {
     let all = [
         ("< ", "Less than."),
@@ -202,7 +202,7 @@ fn joints() -> Vec<Candidate> {
         .into()
 }
 
-/// Those that begin with `word` first, then those that hold it, in their own order; none that is written already.
+/// The candidates that begin with `word`, then the others that contain it, in their given order; an exact match is left out.
 fn ranked(candidates: Vec<Candidate>, word: &str) -> Vec<Candidate> {
     let lower = word.to_lowercase();
     let rank = |candidate: &Candidate| {

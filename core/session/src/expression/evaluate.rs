@@ -1,8 +1,8 @@
-//! The value of a checked expression at one step of a run. Total: every expression has a value at every step, and
-//! costs at most twice as many operations as it has parts.
+//! Evaluates a checked expression at one step of a run. Evaluation is total: every expression has a value at every step, and
+//! costs at most twice as many operations as it has nodes.
 //!
-//! Whatever is not there is missing; what is computed from a missing value is missing; a comparison with a missing
-//! value is false, `!=` included; a condition that is missing is false. A number that is not finite is missing.
+//! Absent fields and non-finite numbers are missing; results computed from a missing value are missing. A comparison with a
+//! missing value is false, `!=` included; a missing condition is false.
 
 use std::cell::OnceCell;
 use std::sync::Arc;
@@ -23,14 +23,14 @@ pub(super) enum Function {
     Hypot,
 }
 
-/// What is evaluated.
+/// The compiled form of an expression.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Code {
-    /// A value that is always the same.
+    /// A constant.
     Constant(Value),
-    /// A value of the step; numbers are divided by how many make one base unit.
+    /// A value of the step; numbers are divided by the number of their units in one base unit.
     Read(Place, f64),
-    /// A number divided by how many make one base unit.
+    /// A number divided by the number of its units in one base unit.
     Scaled(Box<Code>, f64),
     Not(Box<Code>),
     Negate(Box<Code>),
@@ -69,7 +69,7 @@ pub(super) struct Moment<'a> {
 }
 
 impl<'a> Moment<'a> {
-    /// The step at `index` of a run; none where there is none.
+    /// The step at `index` of a run; `None` if there is none.
     pub(super) fn new(runs: &'a Runs<'a>, run: usize, index: usize) -> Option<Self> {
         runs.get(run)?.get(index)?;
         Some(Self { runs, run, index, row: OnceCell::new(), before: OnceCell::new() })
@@ -100,7 +100,7 @@ impl<'a> Moment<'a> {
 }
 
 impl Code {
-    /// The number, where it is one that no step changes.
+    /// The number, if it does not depend on the step.
     pub(super) fn constant(&self) -> Option<f64> {
         match self {
             Self::Constant(Value::Number(value)) => Some(*value),
@@ -205,7 +205,7 @@ fn apply(function: Function, of: &[f64]) -> f64 {
     }
 }
 
-/// Whether a value differs between two runs at this stop; a stop that one of them lacks tells nothing.
+/// Whether a value differs between two runs at this stop; false if one of them lacks the stop.
 fn differs(moment: &Moment<'_>, runs: [usize; 2], of: &Code, beyond: f64) -> bool {
     let [Some(a), Some(b)] = runs.map(|run| moment.in_run(run)) else { return false };
     match (of.value(&a), of.value(&b)) {

@@ -1,6 +1,6 @@
-//! One value out of a record, by its path: a `serde` serialiser that looks at nothing else and builds nothing.
+//! Extracts one value of a record by its path: a `serde` serialiser that skips all other fields and builds no tree.
 //!
-//! A number that is not finite, and whatever is not there, is missing.
+//! Non-finite numbers and absent fields are missing.
 
 use std::fmt::Display;
 
@@ -11,22 +11,22 @@ use super::tree::Segment;
 /// A value of a step.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
-    /// There is none.
+    /// No value.
     Missing,
-    /// A number; of a whole expression in the expression's unit, inside of one in base units.
+    /// A number: in base units during evaluation, in the expression's unit as its result.
     Number(f64),
     /// Yes or no.
     Truth(bool),
     /// A word or a text.
     Word(String),
-    /// A list of so many entries.
+    /// A list, with its number of entries.
     List(usize),
-    /// Something with fields.
+    /// A record with fields.
     Record,
 }
 
 impl Value {
-    /// A number, where it is one.
+    /// A number; missing if it is not finite.
     pub(super) fn of_number(value: f64) -> Self {
         if value.is_finite() { Self::Number(value) } else { Self::Missing }
     }
@@ -37,7 +37,7 @@ pub(super) fn extract<T: Serialize + ?Sized>(record: &T, path: &[Segment]) -> Va
     record.serialize(Extract { path }).unwrap_or(Value::Missing)
 }
 
-/// What a record says that cannot be written: its value is missing.
+/// The error of the serialiser; the value is then missing.
 #[derive(Debug)]
 struct Unreadable;
 
@@ -59,7 +59,7 @@ struct Extract<'a> {
 }
 
 impl<'a> Extract<'a> {
-    /// A value that has nothing inside.
+    /// A value without parts.
     fn leaf(self, value: Value) -> Result<Value, Unreadable> {
         Ok(if self.path.is_empty() { value } else { Value::Missing })
     }
@@ -69,7 +69,7 @@ impl<'a> Extract<'a> {
         Inside { path: self.path, found, count: 0, is_next: false }
     }
 
-    /// The one variant of an enum, as a record of one field.
+    /// An enum variant with data, as a record of one field.
     fn variant<T: Serialize + ?Sized>(self, name: &str, value: &T) -> Result<Value, Unreadable> {
         match self.path.split_first() {
             None => Ok(Value::Record),
@@ -79,7 +79,7 @@ impl<'a> Extract<'a> {
     }
 }
 
-/// What lies in a list or a record, one after the other.
+/// Serialises the entries of a list or the fields of a record, one after the other.
 struct Inside<'a> {
     path: &'a [Segment],
     found: Value,

@@ -1,4 +1,4 @@
-//! The functions of the language: what they are given, how they are written, what they mean.
+//! The functions of the language: arguments, notation and meaning.
 
 use super::evaluate::Function;
 
@@ -7,17 +7,17 @@ use super::evaluate::Function;
 pub(super) enum Signature {
     /// Numbers of one unit.
     Numbers(Function),
-    /// The value at the step before.
+    /// The value at the previous step.
     Before,
-    /// Whether it is another than at the step before.
+    /// Whether the value differs from that of the previous step.
     Changes,
-    /// Whether there is a value (true), or none (false).
+    /// Whether a value exists (true), or is missing (false).
     Has(bool),
-    /// Entries of a list.
+    /// The number of entries of a list.
     Count,
-    /// A text in a text.
+    /// Whether a text contains another.
     Contains,
-    /// Two runs.
+    /// Whether a value differs between two runs.
     Differs,
 }
 
@@ -26,9 +26,9 @@ pub(super) enum Signature {
 pub struct FunctionInfo {
     /// Its name.
     pub name: &'static str,
-    /// How it is written.
+    /// Its notation.
     pub form: &'static str,
-    /// What it means.
+    /// Its meaning, as one sentence.
     pub meaning: &'static str,
     pub(super) signature: Signature,
     pub(super) takes: (usize, usize),
@@ -44,7 +44,7 @@ const fn function(
     FunctionInfo { name, form, meaning, signature, takes }
 }
 
-/// The most values that `min`, `max` and `hypot` take.
+/// Maximum number of arguments of `min`, `max` and `hypot`.
 const MOST: usize = 16;
 
 /// All functions.

@@ -1,15 +1,15 @@
-//! The expression language: small, total questions about any value of any stage of a step.
+//! The expression language: small, total expressions over the values of all stages of a step.
 //!
 //! ```text
 //! ncc < 0.6 && step > 10          state changes                 err_px > 2 px
 //! sigma_m > 5 cm or state == lost judge.gates.ncc.margin < 5 %  differs(A, B, ncc, 0.02)
 //! ```
-//! Breakpoints are expressions that are yes or no; derived columns are expressions that are numbers. The whole language
-//! is described in docs/expressions.md, which a test keeps true. Reading it goes text → `token` → `parse` →
-//! `tree` → `check` → `evaluate`; names come from [`catalogue`], which is made from the schema of the record.
+//! Breakpoints are conditions; derived columns are numbers or conditions. docs/expressions.md describes the whole language;
+//! a test compares it with the code. The passes are text → `token` → `parse` → `tree` → `check` → `evaluate`; the names are
+//! in [`catalogue`], which is built from the schema of the record.
 //!
-//! There are no loops and no definitions; length, depth and parts are limited; every expression has a value at every
-//! step. What is wrong with a text is one sentence with its place.
+//! There are no loops and no definitions; length, depth and number of nodes are limited; every expression has a value at
+//! every step. An error is one sentence with its position in the text.
 
 mod calls;
 pub mod catalogue;
@@ -43,23 +43,23 @@ pub use self::extract::Value;
 use self::tree::{Kind, Node, Segment};
 use self::unit::Unit;
 
-/// How many characters an expression may have.
+/// Maximum number of characters of an expression.
 pub const LENGTH_LIMIT: usize = 500;
-/// How many things may stand inside each other.
+/// Maximum depth of nesting.
 pub const DEPTH_LIMIT: usize = 32;
-/// How many parts an expression may have.
+/// Maximum number of nodes of an expression.
 pub(crate) const NODE_LIMIT: usize = 200;
 
-/// What is wrong with an expression, and where.
+/// An error in an expression, with its position.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct Refused {
-    /// One sentence, without its beginning and its full stop.
+    /// The error as a clause, without capital letter and full stop.
     pub sentence: String,
     /// The first character at fault, from 0.
     pub from: usize,
-    /// The first character after it.
+    /// The first character after the fault.
     pub to: usize,
-    /// How to mend it.
+    /// How to correct it.
     pub hint: Option<String>,
 }
 
@@ -69,19 +69,19 @@ impl fmt::Display for Refused {
     }
 }
 
-/// What an expression's value is.
+/// The type of an expression's value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Answers {
     /// A number, with its unit.
     Number,
-    /// Yes or no: it can be a breakpoint.
+    /// Yes or no; can be a breakpoint.
     Truth,
-    /// A word: it can be compared, not plotted.
+    /// A word; can be compared, but not plotted.
     Word,
 }
 
-/// An expression that was read and checked.
+/// A parsed and checked expression.
 #[derive(Clone, Debug)]
 pub struct Expression {
     tree: Node,
@@ -95,7 +95,7 @@ impl Expression {
     /// Reads an expression.
     ///
     /// # Errors
-    /// What is wrong with it, and where.
+    /// The error and its position.
     pub fn read(text: &str) -> Result<Self, Refused> {
         let tree = parse::parse(text)?;
         let mut checker = Checker { text, runs: Vec::new(), inside_differs: false };
@@ -120,10 +120,10 @@ impl Expression {
         Ok(Self { tree, code: checked.code, answers, unit, runs })
     }
 
-    /// Reads an expression that is yes or no.
+    /// Reads a condition.
     ///
     /// # Errors
-    /// What is wrong with it, and where.
+    /// The error and its position.
     pub fn condition(text: &str) -> Result<Self, Refused> {
         let read = Self::read(text)?;
         if read.answers == Answers::Truth {
@@ -133,10 +133,10 @@ impl Expression {
         Err(refused.hint(format!("Compare it, for example `{} > 1`.", text.trim())))
     }
 
-    /// Reads an expression that can be plotted: a number, or yes or no.
+    /// Reads an expression that can be plotted: a number or a condition.
     ///
     /// # Errors
-    /// What is wrong with it, and where.
+    /// The error and its position.
     pub fn column(text: &str) -> Result<Self, Refused> {
         let read = Self::read(text)?;
         if read.answers != Answers::Word {
@@ -146,7 +146,7 @@ impl Expression {
         Err(refused.hint(format!("Compare it, for example `{} == lost`.", text.trim())))
     }
 
-    /// What its value is.
+    /// The type of its value.
     pub fn answers(&self) -> Answers {
         self.answers
     }
@@ -156,12 +156,12 @@ impl Expression {
         self.unit.symbol()
     }
 
-    /// The runs that it compares, by number; empty where it looks at one run alone.
+    /// The numbers of the runs that it compares; empty if it does not compare runs.
     pub(crate) fn runs_compared(&self) -> &[usize] {
         &self.runs
     }
 
-    /// The step that it names, where it is `step == 12` and nothing else.
+    /// The step in `step == 12`; `None` for any other expression.
     pub fn step_named(&self) -> Option<usize> {
         let Kind::Pair(tree::Operator::Equal, left, right) = &self.tree.kind else { return None };
         let is_step = left.kind == Kind::Path(vec![Segment::Field("step".to_owned())]);
@@ -173,8 +173,7 @@ impl Expression {
         }
     }
 
-    /// Its value at step `index` of a run, counted from the run's first one, in its unit. Where there is no such step
-    /// it is missing.
+    /// Its value at step `index` of a run, counted from the run's first step, in its unit; missing if there is no such step.
     pub fn value(&self, runs: &Runs<'_>, run: usize, index: usize) -> Value {
         let value = Moment::new(runs, run, index).map_or(Value::Missing, |moment| self.code.value(&moment));
         match value {
@@ -195,7 +194,7 @@ impl fmt::Display for Expression {
     }
 }
 
-/// The letter of a run, as pages name it: A to Z, then A1 and so on.
+/// The letter of a run: A to Z, then A1 and so on.
 pub fn run_letter(number: usize) -> String {
     let letter = char::from(b'A' + (number % 26) as u8);
     if number < 26 { letter.to_string() } else { format!("{letter}{}", number / 26) }
@@ -210,7 +209,7 @@ pub(crate) fn run_number(letter: &str) -> Option<usize> {
     (run_letter(number) == letter).then_some(number)
 }
 
-/// A path as it is written; none where the text is something else.
+/// Parses a path; `None` if the text is not a path.
 pub(crate) fn path_of(text: &str) -> Option<Vec<Segment>> {
     match parse::parse(text).ok()?.kind {
         Kind::Path(path) => Some(path),
@@ -218,7 +217,7 @@ pub(crate) fn path_of(text: &str) -> Option<Vec<Segment>> {
     }
 }
 
-/// How many characters stand before a byte.
+/// Number of characters before a byte offset.
 fn chars_before(text: &str, byte: usize) -> usize {
     text.char_indices().take_while(|(at, _)| *at < byte).count()
 }

@@ -1,11 +1,11 @@
-//! What to say of a name that does not exist: the nearest one that does.
+//! Errors for unknown names, with the most similar known name as a hint.
 
 use super::catalogue::{Unknown, gates};
 use super::functions::FUNCTIONS;
 use super::tree::{Node, Segment, path_text};
 use super::{Refused, chars_before};
 
-/// The name most like `word`, if any is like it.
+/// The name most similar to `word`; `None` if none is similar.
 pub(super) fn nearest<'a>(word: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     let likeness = |name: &'a str| {
         let contains = name.len() > 3 && word.len() > 3 && (name.contains(word) || word.contains(name));
@@ -16,7 +16,7 @@ pub(super) fn nearest<'a>(word: &str, names: impl Iterator<Item = &'a str>) -> O
     best.filter(|(likeness, _)| *likeness > 0.75).map(|(_, name)| name)
 }
 
-/// A path that leads nowhere.
+/// The error of an unknown path.
 pub(super) fn unknown(text: &str, node: &Node, path: &[Segment], unknown: &Unknown) -> Refused {
     let at = unknown.at.min(path.len().saturating_sub(1));
     let (before, with) = (path_text(&path[..at]), path_text(&path[..=at]));
@@ -39,7 +39,7 @@ pub(super) fn unknown(text: &str, node: &Node, path: &[Segment], unknown: &Unkno
     }
 }
 
-/// Where the segment at fault stands, if the path was written without spaces.
+/// The span of the segment at fault; the whole path if it contains spaces.
 fn place(text: &str, node: &Node, before: &str, with: &str) -> std::ops::Range<usize> {
     let span = node.span.clone();
     if text[span.clone()].starts_with(with) {
@@ -51,7 +51,7 @@ fn place(text: &str, node: &Node, before: &str, with: &str) -> std::ops::Range<u
     }
 }
 
-/// A function that does not exist.
+/// The error of an unknown function.
 pub(super) fn unknown_function(text: &str, node: &Node, name: &str) -> Refused {
     let span = node.span.start..node.span.start + name.len();
     let refused = Refused::at(text, span, format!("there is no function `{name}`"));
@@ -63,19 +63,19 @@ pub(super) fn unknown_function(text: &str, node: &Node, name: &str) -> Refused {
 }
 
 impl Refused {
-    /// Something at these bytes of the text is wrong.
+    /// An error at these bytes of the text.
     pub(super) fn at(text: &str, span: std::ops::Range<usize>, sentence: String) -> Self {
         let from = chars_before(text, span.start);
         let to = chars_before(text, span.end.max(span.start));
         Self { sentence, from, to, hint: None }
     }
 
-    /// The whole text is wrong.
+    /// An error of the whole text.
     pub(super) fn whole(text: &str, sentence: String) -> Self {
         Self::at(text, 0..text.len(), sentence)
     }
 
-    /// Adds how to mend it.
+    /// Adds a hint for the correction.
     #[must_use]
     pub(super) fn hint(mut self, hint: impl Into<String>) -> Self {
         self.hint = Some(hint.into());

@@ -1,4 +1,4 @@
-//! From tokens to a tree, by precedence climbing. Length, depth and the number of nodes are limited.
+//! Parses tokens into a tree by precedence climbing. Length, depth and the number of nodes are limited.
 
 use std::ops::Range;
 
@@ -29,12 +29,12 @@ pub(super) fn parse(text: &str) -> Result<Node, Refused> {
     }
 }
 
-/// Whether a word is a name, so that it cannot have been meant as a unit.
+/// Whether a word is a known name, so that it was not meant as a unit.
 fn is_known(word: &str) -> bool {
     CATALOGUE.find(&[Segment::Field(word.to_owned())]).is_ok()
 }
 
-/// The label of several words that a text contains, as panels show it, with the name of its quantity.
+/// The first label of several words, as shown by panels, that the text contains, with the name of its quantity.
 fn named_by_label(text: &str) -> Option<(String, String)> {
     let text = text.to_lowercase();
     let columns = records::row_columns().iter().filter_map(|column| records::row_quantity(&column.name));
@@ -51,7 +51,7 @@ struct Parser<'a> {
 }
 
 impl Parser<'_> {
-    /// A value with everything after it that binds at least as strongly as `least`.
+    /// Parses a value and all following operators of at least precedence `least`.
     fn expression(&mut self, least: u8) -> Result<Node, Refused> {
         self.depth += 1;
         if self.depth > DEPTH_LIMIT {
@@ -71,7 +71,7 @@ impl Parser<'_> {
         Ok(left)
     }
 
-    /// Comparisons in a row mean something else in every language, so here they mean nothing.
+    /// Refuses chained comparisons, whose meaning differs between languages.
     fn refuse_chain(
         &self,
         operator: Operator,
@@ -87,7 +87,7 @@ impl Parser<'_> {
         Err(Refused::at(self.text, sign.start..self.here().end, sentence).hint(hint))
     }
 
-    /// `!` and the minus before a value.
+    /// Parses a value with its prefix `!` or `-`, or its suffix `changes`.
     fn prefixed(&mut self, least: u8) -> Result<Node, Refused> {
         let start = self.here().start;
         if self.is_sign("!") || self.is_word("not") {
@@ -115,7 +115,7 @@ impl Parser<'_> {
         Ok(node)
     }
 
-    /// A number, a text, a name, a call, or something in parentheses.
+    /// Parses a number, a text, a name, a call, or an expression in parentheses.
     fn value(&mut self) -> Result<Node, Refused> {
         let Some((token, span)) = self.tokens.get(self.at).cloned() else {
             return Err(Refused::at(self.text, self.here(), "the expression ends too soon".to_owned()));
@@ -260,12 +260,12 @@ impl Parser<'_> {
         Err(Refused::at(self.text, open.clone(), sentence))
     }
 
-    /// The place of the next token, or the end of the text.
+    /// The span of the next token; empty at the end of the text.
     fn here(&self) -> Range<usize> {
         self.tokens.get(self.at).map_or(self.text.len()..self.text.len(), |(_, span)| span.clone())
     }
 
-    /// The place of the token before.
+    /// The span of the previous token.
     fn before(&self) -> Range<usize> {
         self.at.checked_sub(1).and_then(|at| self.tokens.get(at)).map_or(0..0, |(_, span)| span.clone())
     }
@@ -274,7 +274,7 @@ impl Parser<'_> {
         Refused::at(self.text, span, format!("a value is missing before `{what}`"))
     }
 
-    /// Something follows that nothing joins to what stands before it.
+    /// The error of a token that no operator connects with the preceding expression.
     fn left_over(&self, token: &Token, span: Range<usize>) -> Refused {
         let after_number = self.at > 0 && matches!(self.tokens[self.at - 1].0, Token::Number(_));
         match token {

@@ -1,5 +1,5 @@
-//! What holds for every text: reading never panics, every expression has a value at every step, and writing what was
-//! read and reading it again gives the same tree.
+//! Properties of every text: parsing does not panic, every expression has a value at every step, and parsing a formatted
+//! tree gives the same tree.
 
 use proptest::prelude::*;
 
@@ -8,7 +8,7 @@ use super::tests::RUNS;
 use super::tree::{Kind, Node, Operator, Segment};
 use super::*;
 
-/// Names of every type, with a unit and without.
+/// Names of every type, with and without a unit.
 const NAMES: [&str; 9] = [
     "ncc",
     "sigma_m",
@@ -44,7 +44,7 @@ fn operator() -> impl Strategy<Value = Operator> {
     ])
 }
 
-/// Any tree, whether it means something or not.
+/// Any tree, valid or not.
 fn tree() -> impl Strategy<Value = Node> {
     let node = |kind: Kind| Node { kind, span: 0..0 };
     leaf().prop_map(node).prop_recursive(5, 24, 3, move |inner| {
@@ -60,7 +60,7 @@ fn tree() -> impl Strategy<Value = Node> {
     })
 }
 
-/// Texts made of the language's own pieces, which come further than letters at random.
+/// Texts of tokens of the language, which reach more of the parser than random letters.
 fn pieces() -> impl Strategy<Value = String> {
     let piece = proptest::sample::select(vec![
         "ncc", "state", "lost", "sigma_m", "judge", ".gates", ".ncc", "[0]", "[", "]", "(", ")", "<", "<=",

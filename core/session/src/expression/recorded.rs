@@ -1,4 +1,4 @@
-//! The quantities that the stages declare, as names of expressions: units, and values that are no field of the record.
+//! The declared quantities of the stages as names of expressions: their units, and values that are not fields of the record.
 
 use std::collections::BTreeMap;
 
@@ -26,7 +26,7 @@ pub(super) fn of_column(path: &str) -> Declared {
     }
 }
 
-/// The stages with all that they declare, as records of names.
+/// The stages with their declared quantities, as records.
 pub(super) fn stages() -> BTreeMap<String, Entry> {
     schemas().map(|stage| (stage.stage.to_string(), entry_of(stage))).collect()
 }
@@ -34,12 +34,12 @@ pub(super) fn stages() -> BTreeMap<String, Entry> {
 /// The stage whose quantities are the columns of a row.
 pub(super) const ROW: &str = "step";
 
-/// The row with all that it declares, as a record of names below its own.
+/// The row with its declared columns, below the name `ROW`.
 pub(super) fn row() -> BTreeMap<String, Entry> {
     records::stage(ROW).map(|row| (ROW.to_owned(), entry_of(row.schema()))).into_iter().collect()
 }
 
-/// The stages that have evidence of their own.
+/// The schemas of the stages with their own evidence.
 fn schemas() -> impl Iterator<Item = &'static StageSchema> {
     records::stages().iter().map(sightline_record::Stage::schema).filter(|schema| !schema.path.is_empty())
 }
@@ -54,7 +54,7 @@ fn entry_of(stage: &StageSchema) -> Entry {
             let record = Entry { meaning: String::new(), shape: Shape::Record(BTreeMap::new()) };
             match &mut within.entry(name.to_owned()).or_insert(record).shape {
                 Shape::Record(inner) => within = inner,
-                // A quantity has no parts beside its components.
+                // A quantity has no parts other than its components.
                 _ => return Entry { meaning: stage.question.to_string(), shape: Shape::Record(fields) },
             }
         }
@@ -76,7 +76,7 @@ fn of_quantity(quantity: &Quantity) -> Entry {
     Entry { meaning, shape }
 }
 
-/// The value of a declared quantity: the stage, the name of the quantity, and a component where it has some.
+/// The value of a declared quantity; the path is the stage, the quantity's name, and optionally a component.
 pub(super) fn read(trace: &RunStep, path: &[Segment]) -> Value {
     let names: Option<Vec<&str>> = path.iter().map(field).collect();
     let found = names.and_then(|names| {

@@ -1,8 +1,7 @@
-//! The record of a step as a tree of names, made from the very schema that the interface documents, so that no field
-//! is missing and none is described twice.
+//! The record of a step as a tree of names, built from the OpenAPI schema, so that no field is missing or described twice.
 //!
-//! Units are those that the stages declare for their quantities; of other fields they come from the name (`_m`) or the type
-//! (`Pixel`), else from what holds the field.
+//! The unit of a field is the one that its stage declares, else it follows from the name (`_m`) or the type (`Pixel`), else
+//! it is that of the enclosing field.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -13,42 +12,42 @@ use utoipa::openapi::{RefOr, Schema};
 
 use super::unit::Unit;
 
-/// How deep records may lie in each other before the walk ends.
+/// Maximum depth of nested records.
 const DEPTH_LIMIT: usize = 16;
 
-/// A name with what lies under it.
+/// A name with the names under it.
 #[derive(Clone, Debug)]
 pub(super) struct Entry {
-    /// What it means, as one sentence.
+    /// Its meaning, as one sentence.
     pub meaning: String,
-    /// What it is.
+    /// The kind of its value.
     pub shape: Shape,
 }
 
-/// What a name stands for.
+/// The kind of value that a name denotes.
 #[derive(Clone, Debug)]
 pub(super) enum Shape {
     /// A number.
     Number(Unit),
     /// Yes or no.
     Truth,
-    /// A word or a text; the words that it can be, where they are known.
+    /// A word or a text, with the possible words; empty if unknown.
     Word(Vec<String>),
-    /// A list of equals.
+    /// A list of entries of the same shape.
     List(Box<Entry>),
     /// Fields by name.
     Record(BTreeMap<String, Entry>),
 }
 
-/// What the record declares for a field.
+/// The declaration of a field by the record.
 pub(super) struct Declared {
     /// The unit.
     pub unit: Option<Unit>,
-    /// The meaning, where the field is a quantity.
+    /// The meaning; `None` if the field is not a quantity.
     pub meaning: Option<String>,
 }
 
-/// What the record declares for the field at a path.
+/// Returns the declaration of the field at a path.
 pub(super) type DeclaredAt = fn(&str) -> Declared;
 
 /// The fields of a type, with the units and meanings that the record declares.
@@ -62,7 +61,7 @@ pub(super) fn fields_of<T: ToSchema>(declared_at: DeclaredAt) -> BTreeMap<String
     }
 }
 
-/// What a field takes over from what holds it.
+/// The properties that a field inherits from the enclosing one.
 #[derive(Clone, Default)]
 struct Context {
     meaning: String,
@@ -108,7 +107,7 @@ impl Walk<'_> {
         };
         match schema {
             Schema::Object(object) if !object.properties.is_empty() => {
-                // What lies deeper is not measured as the whole is, unless it says so.
+                // Fields inherit the unit of the whole unless they declare their own.
                 let fields = object.properties.iter();
                 let entry = |(name, field): (&String, &RefOr<Schema>)| {
                     (name.clone(), self.entry(field, name, context))
@@ -137,14 +136,14 @@ impl Walk<'_> {
         }
     }
 
-    /// Alternatives as one: whichever a step has, its fields can be named.
+    /// Merges alternatives, so that the fields of each can be named.
     fn together(&self, items: &[RefOr<Schema>], context: &Context) -> Shape {
         let shapes = items.iter().filter(|item| !is_null(item)).map(|item| self.shape(item, context));
         shapes.reduce(merged).unwrap_or_else(|| Shape::Record(BTreeMap::new()))
     }
 }
 
-/// The name of the type that a field, or a field that may be null, refers to.
+/// The name of the type to which a field, possibly nullable, refers.
 fn type_of(schema: &RefOr<Schema>) -> Option<&str> {
     match schema {
         RefOr::Ref(to) => to.ref_location.rsplit('/').next(),
@@ -155,7 +154,7 @@ fn type_of(schema: &RefOr<Schema>) -> Option<&str> {
     }
 }
 
-/// The unit of the types that have one.
+/// The unit of a type; `None` for types without one.
 fn unit_of_type(name: &str) -> Option<Unit> {
     matches!(name, "Pixel" | "PixelRect").then(|| Recorded::Pixel.into())
 }
@@ -194,7 +193,7 @@ fn only_type(schema_type: &SchemaType) -> Option<Type> {
     }
 }
 
-/// What is said of a field; of one that may be null it stands beside what it refers to.
+/// The description of a field; a nullable field may have it at its only non-null alternative.
 fn description(schema: &RefOr<Schema>) -> Option<&str> {
     own_description(schema).or_else(|| match schema {
         RefOr::T(Schema::OneOf(one)) => {

@@ -1,4 +1,4 @@
-//! The language against runs whose truth is known: what each expression means, and what is said of bad ones.
+//! The language on runs with known truth: the value of each expression, and the errors of invalid ones.
 
 use std::sync::{Arc, LazyLock};
 
@@ -13,7 +13,7 @@ use sightline_track::target::Designation;
 
 type Steps = Vec<Arc<RunStep>>;
 
-/// Six stops towards the plane; at stop 3 both eyes are covered, at stop 5 the files are missing.
+/// Six stops towards the plane; at stop 3 both cameras are covered, at stop 5 the files are missing.
 fn run(changes: &[(&str, serde_json::Value)]) -> Steps {
     let mut world =
         PlaneWorld::new((0..6).map(|k| Pose::translation(0.3 * f64::from(k), 0.0, 0.0)).collect());
@@ -311,7 +311,7 @@ fn every_gate_and_every_column_of_a_real_run_is_in_the_catalogue() {
     for column in row.as_object().unwrap().keys() {
         assert!(names.contains(column), "{column}");
     }
-    // Every field that a step really has can be named, except below the tracker's memory, which is the tracker's own.
+    // Every field of a recorded step can be named, except the private fields of the tracker's memory.
     let trace = serde_json::to_value(RUNS[0][1].as_ref()).unwrap();
     let mut open = vec![(String::new(), trace)];
     while let Some((path, value)) = open.pop() {
@@ -366,7 +366,7 @@ fn completion_offers_names_with_units_words_after_a_comparison_and_parts_after_a
     assert!(texts("hyp").contains(&"hypot(".to_owned()));
     assert!(texts("sigma_m > 5 ").contains(&"cm".to_owned()));
     assert!(texts("ncc ").contains(&"< ".to_owned()));
-    // After a sign that takes one unit on both sides, what has that unit comes first.
+    // After an operator whose operands must have the same unit, names with that unit come first.
     for text in
         ["ncc < ", "sigma_m >= ", "step > 2 && err_px < ", "(hypot(err_m, 2 cm) - ", "not scale * 2 == "]
     {

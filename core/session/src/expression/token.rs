@@ -1,4 +1,4 @@
-//! The words and signs of an expression, each with its place. Built on `winnow`.
+//! The tokens of an expression, each with its span. Built on `winnow`.
 
 use std::ops::Range;
 
@@ -14,23 +14,23 @@ use super::Refused;
 
 type Input<'a> = LocatingSlice<&'a str>;
 
-/// What a token is.
+/// A token.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Token {
     /// A number without its sign.
     Number(f64),
-    /// A name, a word of the language, or a unit.
+    /// A name, a keyword, or a unit.
     Name(String),
-    /// A text in quotes, without them.
+    /// A text in quotes, without the quotes.
     Text(String),
     /// A sign of one or two characters.
     Sign(&'static str),
 }
 
-/// A token with the bytes that it takes.
+/// A token with its span in bytes.
 pub(super) type Placed = (Token, Range<usize>);
 
-/// The signs, those of two characters first; each with what it stands for.
+/// The signs, those of two characters first, each with its canonical form.
 const SIGNS: [(&str, &str); 22] = [
     ("&&", "&&"),
     ("||", "||"),
@@ -61,7 +61,7 @@ pub(super) fn tokens(text: &str) -> std::result::Result<Vec<Placed>, Refused> {
     let mut input = LocatingSlice::new(text);
     let mut found = Vec::new();
     loop {
-        // Space always parses, also none of it.
+        // Succeeds even without space.
         let _: Result<&str> = multispace0.parse_next(&mut input);
         let at = input.current_token_start();
         if input.is_empty() {
@@ -77,12 +77,12 @@ pub(super) fn tokens(text: &str) -> std::result::Result<Vec<Placed>, Refused> {
     }
 }
 
-/// Whether a text is one name and nothing else.
+/// Whether a text is a single name.
 pub(super) fn is_name(text: &str) -> bool {
     name.parse(LocatingSlice::new(text)).is_ok()
 }
 
-/// What cannot begin a token.
+/// The error of a character that cannot begin a token.
 fn unknown(text: &str, at: usize) -> Refused {
     let rest = &text[at..];
     let first = rest.chars().next().unwrap_or(' ');
@@ -107,7 +107,7 @@ fn digits<'a>(input: &mut Input<'a>) -> Result<&'a str> {
     take_while(1.., AsChar::is_dec_digit).parse_next(input)
 }
 
-/// `12`, `0.5`, `.5`, `2e-3`. A huge one becomes infinite and is refused by its place.
+/// `12`, `0.5`, `.5`, `2e-3`. Numbers that overflow become infinite and are refused by the caller.
 fn number(input: &mut Input<'_>) -> Result<f64> {
     let fraction = || preceded('.', digits);
     let exponent = (one_of(['e', 'E']), opt(one_of(['+', '-'])), digits);
@@ -121,7 +121,7 @@ fn name(input: &mut Input<'_>) -> Result<String> {
     (first, rest).take().map(str::to_owned).parse_next(input)
 }
 
-/// A text in double or single quotes; a backslash takes the next character as it is.
+/// A text in double or single quotes; a backslash escapes the next character.
 fn text(input: &mut Input<'_>) -> Result<String> {
     alt((quoted('"'), quoted('\''))).parse_next(input)
 }

@@ -1,4 +1,4 @@
-//! An expression as a tree, and how it is written again: reading what was written gives the same tree.
+//! An expression as a tree, and its formatting: parsing the formatted text gives the same tree.
 
 use std::fmt;
 use std::ops::Range;
@@ -6,13 +6,13 @@ use std::ops::Range;
 /// One step of a path into a record.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Segment {
-    /// A field, or the entry of a list that bears this name.
+    /// A field, or the entry of a list with this `name`.
     Field(String),
     /// An entry of a list, from 0.
     Index(usize),
 }
 
-/// What stands between two values.
+/// A binary operator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Operator {
     /// `||`
@@ -42,7 +42,7 @@ pub(crate) enum Operator {
 }
 
 impl Operator {
-    /// Its sign.
+    /// Its canonical sign.
     pub(crate) const fn sign(self) -> &'static str {
         match self {
             Self::Or => "||",
@@ -60,7 +60,7 @@ impl Operator {
         }
     }
 
-    /// How strongly it binds: the higher, the sooner.
+    /// Its precedence: a greater number binds more strongly.
     pub(super) const fn strength(self) -> u8 {
         match self {
             Self::Or => 1,
@@ -71,27 +71,27 @@ impl Operator {
         }
     }
 
-    /// Whether it compares.
+    /// Whether it is a comparison.
     pub(crate) const fn is_comparison(self) -> bool {
         self.strength() == 4
     }
 }
 
-/// How strongly `!` binds: less than a comparison, so that `!a < b` is `!(a < b)`.
+/// The precedence of `!`: lower than that of a comparison, so that `!a < b` is `!(a < b)`.
 pub(super) const NOT: u8 = 3;
-/// How strongly a minus before a value binds.
+/// The precedence of the unary minus.
 pub(super) const NEGATE: u8 = 7;
-/// What needs no parentheses anywhere.
+/// The precedence of nodes that never need parentheses.
 const ATOM: u8 = 9;
 
-/// What a node is.
+/// The kind of a node, with its operands.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Kind {
-    /// A number with the unit that was written after it.
+    /// A number with the unit that follows it.
     Number {
         /// The number.
         value: f64,
-        /// The word of its unit.
+        /// The word of its unit; `None` without one.
         unit: Option<String>,
     },
     /// `true` or `false`.
@@ -102,20 +102,20 @@ pub(crate) enum Kind {
     Path(Vec<Segment>),
     /// `!`
     Not(Box<Node>),
-    /// A minus before a value.
+    /// A unary minus.
     Negate(Box<Node>),
-    /// Two values with what stands between them.
+    /// A binary operator with its operands.
     Pair(Operator, Box<Node>, Box<Node>),
-    /// A function with what it is given.
+    /// A call of a function, with its arguments.
     Call(String, Vec<Node>),
 }
 
-/// A node with the bytes of the text that it takes; two nodes are alike wherever they stand.
+/// A node with its span; equality ignores the spans.
 #[derive(Clone, Debug)]
 pub(crate) struct Node {
-    /// What it is.
+    /// Its kind.
     pub kind: Kind,
-    /// Where it stands.
+    /// Its span in the text, bytes.
     pub span: Range<usize>,
 }
 
@@ -135,7 +135,7 @@ impl Node {
         }
     }
 
-    /// Writes the node, in parentheses where it binds less than `least`.
+    /// Writes the node, in parentheses if its precedence is below `least`.
     fn write(&self, out: &mut fmt::Formatter<'_>, least: u8) -> fmt::Result {
         if self.strength() < least {
             return write!(out, "({self})");
@@ -160,7 +160,7 @@ impl Node {
             }
             Kind::Pair(operator, left, right) => {
                 let strength = operator.strength();
-                // Equals are read from the left; comparisons are not read in a row at all.
+                // Operators of equal precedence associate to the left; comparisons do not associate.
                 left.write(out, strength + u8::from(operator.is_comparison()))?;
                 write!(out, " {} ", operator.sign())?;
                 right.write(out, strength + 1)
@@ -182,7 +182,7 @@ impl fmt::Display for Node {
     }
 }
 
-/// A number with all its digits, as short as it can be read again.
+/// Writes the shortest representation that parses to the same number.
 fn write_number(out: &mut fmt::Formatter<'_>, value: f64) -> fmt::Result {
     if value == 0.0 || (1e-5..1e15).contains(&value) {
         write!(out, "{value}")
@@ -202,7 +202,7 @@ fn write_path(out: &mut fmt::Formatter<'_>, segments: &[Segment]) -> fmt::Result
     Ok(())
 }
 
-/// A path as it is written.
+/// A path as text: `judge.gates[0].value`.
 pub(crate) fn path_text(segments: &[Segment]) -> String {
     let node = Node { kind: Kind::Path(segments.to_vec()), span: 0..0 };
     node.to_string()

@@ -1,7 +1,7 @@
-//! Units of the expression language: what they measure, how they convert, and how names tell them.
+//! Units of the expression language: their dimensions, their conversion, and their words.
 //!
-//! Values are computed in base units (m, px, rad, s); a unit says how many of it make one base unit. Numbers are divided
-//! by that, so that `35 cm` and `0.35 m` are the same bits.
+//! Values are computed in base units (m, px, rad, s). A unit stores the number of its units in one base unit; numbers are
+//! divided by it, so that `35 cm` and `0.35 m` have the same bits.
 
 use std::borrow::Cow;
 
@@ -23,15 +23,15 @@ pub struct Unit {
 }
 
 impl Unit {
-    /// No unit: scores, shares and counts.
+    /// No unit: scores, ratios and counts.
     pub const NONE: Self = Self { dimension: Dimension([0; 4]), per_base: 1.0, symbol: Cow::Borrowed("") };
 
-    /// The unit of a word that may follow a number.
+    /// The unit of a word that may follow a number; `None` for other words.
     pub fn of_word(word: &str) -> Option<Self> {
         Recorded::all().find(|unit| unit.is_typed() && unit.word() == word).map(Self::from)
     }
 
-    /// The unit of a name's symbol; none where it is no symbol.
+    /// The unit of a symbol; `None` if it is not a symbol.
     pub(super) fn of_symbol(symbol: &str) -> Option<Self> {
         Recorded::from_word(symbol).map(Self::from)
     }
@@ -41,7 +41,7 @@ impl Unit {
         Recorded::all().filter(|unit| unit.is_typed()).map(Recorded::word)
     }
 
-    /// The unit that the end of a name tells (`sigma_m`, `covariance_px2`).
+    /// The unit of a name by its suffix (`sigma_m`, `covariance_px2`) or its frame.
     pub fn of_name(name: &str) -> Option<Self> {
         Recorded::of_name(name).map(Self::from)
     }
@@ -69,37 +69,37 @@ impl Unit {
         Self { dimension, per_base: 1.0, symbol: symbol.into() }
     }
 
-    /// How it is written; empty without one.
+    /// Its symbol; empty without a unit.
     pub fn symbol(&self) -> &str {
         &self.symbol
     }
 
-    /// Whether both measure the same.
+    /// Whether both have the same dimension.
     pub fn is_alike(&self, other: &Self) -> bool {
         self.dimension == other.dimension
     }
 
-    /// Whether it measures nothing: a plain number or a share.
+    /// Whether it is dimensionless: a plain number or a percentage.
     pub fn is_none(&self) -> bool {
         self.dimension == Dimension::default()
     }
 
-    /// How many of it make one base unit.
+    /// The number of these units in one base unit.
     pub fn per_base(&self) -> f64 {
         self.per_base
     }
 
-    /// A number of it in base units.
+    /// Converts a number in this unit to base units.
     pub(crate) fn to_base(&self, value: f64) -> f64 {
         value / self.per_base
     }
 
-    /// A number of base units in it.
+    /// Converts a number in base units to this unit.
     pub fn from_base(&self, value: f64) -> f64 {
         value * self.per_base
     }
 
-    /// The unit of a product (`power` 1) or a quotient (−1); none where an exponent grows too large.
+    /// The unit of a product (`power` 1) or a quotient (−1); `None` if an exponent overflows.
     pub fn times(&self, other: &Self, power: i8) -> Option<Self> {
         if other.is_none() {
             return Some(self.clone());
@@ -114,13 +114,13 @@ impl Unit {
         Some(Self::of_dimension(Dimension(exponents)))
     }
 
-    /// The unit of a square root; none where an exponent is odd.
+    /// The unit of a square root; `None` if an exponent is odd.
     pub fn root(&self) -> Option<Self> {
         let is_even = self.dimension.0.iter().all(|power| power % 2 == 0);
         is_even.then(|| Self::of_dimension(Dimension(self.dimension.0.map(|power| power / 2))))
     }
 
-    /// As a part of a sentence: “in m” or “without a unit”.
+    /// The unit as a part of a sentence: “in m” or “without a unit”.
     pub fn in_words(&self) -> String {
         match self.symbol.as_ref() {
             "" => "without a unit".to_owned(),

@@ -1,8 +1,8 @@
-//! Errors against the truth, shares within thresholds, and what the states were worth.
+//! Errors against the truth, fractions of steps within thresholds, and the correctness of the tracking states.
 //!
-//! Mean, median and largest error are over the steps at which the tracker says that it tracks: there it reports a place.
-//! A tracker that gives up early must not look good by that, so the shares within a threshold (PCK) are over all steps at
-//! which the truth is known (px: and in the image), and a step that is lost counts as outside.
+//! Mean, median and largest error are over the steps in state `tracking`, at which the tracker reports a position. So that
+//! a tracker does not gain by giving up early, the fractions within a threshold (PCK) are over all steps with a known truth
+//! (for px: inside the image), and a lost step counts as outside.
 
 use super::{Judged, Metric, THRESHOLDS_CM, THRESHOLDS_PX};
 use sightline_geometry::estimate::quantile::median;
@@ -45,7 +45,7 @@ pub(super) fn states(judged: &[Judged<'_>]) -> Vec<Metric> {
     vec![tracked, survival, false_lost, false_tracking]
 }
 
-/// What is not located is farther than anything.
+/// A missing position sorts as infinitely far.
 fn order(error: Option<f64>) -> f64 {
     error.unwrap_or(f64::INFINITY)
 }
@@ -68,7 +68,7 @@ pub(super) fn in_space(judged: &[Judged<'_>]) -> Vec<Metric> {
     of_samples(&samples, "cm", &THRESHOLDS_CM, NO_TRUTH)
 }
 
-/// A step's error, where the tracker reports a place.
+/// The error of a step; `None` unless the state is `tracking`.
 struct Sample {
     step: usize,
     error: Option<f64>,
@@ -103,7 +103,7 @@ fn of_samples(samples: &[Sample], unit: &str, thresholds: &[f64], why: &str) -> 
         }
         let is_within = |sample: &&Sample| sample.error.is_some_and(|error| error < *threshold);
         let share = samples.iter().filter(is_within).count() as f64 / samples.len() as f64;
-        // Of equally bad steps (nothing is reported) the first one.
+        // Of equally bad steps (without a position) the first one counts.
         let outside = samples.iter().filter(|sample| !is_within(sample)).rev();
         let worst = outside.max_by(|a, b| order(a.error).total_cmp(&order(b.error)));
         Metric::new(name, "", Some(share), samples.len(), worst.map(|sample| sample.step))

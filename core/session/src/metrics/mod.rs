@@ -1,11 +1,11 @@
-//! What a run is worth, in numbers: errors, shares within thresholds, survival, and whether its covariances hold.
+//! Metrics of a run: errors, fractions of steps within thresholds, survival, and the consistency of its covariances.
 //!
-//! Each metric knows the step at which the run does worst by it, how many steps it was made of, and, where it cannot be
-//! given, why. The protocol is ours; two of its metrics are those of TAP-Vid (Doersch et al., *TAP-Vid: A Benchmark for
-//! Tracking Any Point in a Video*, NeurIPS 2022 Datasets and Benchmarks, section 3): average Jaccard and occlusion
-//! accuracy, evaluated "query first", in pixels of the image rather than of one reduced to 256 × 256.
+//! Each metric contains its worst step, the number of steps used, and the reason if it has no value. The protocol is ours;
+//! two of its metrics are from TAP-Vid (Doersch et al., *TAP-Vid: A Benchmark for Tracking Any Point in a Video*, NeurIPS
+//! 2022 Datasets and Benchmarks, section 3): average Jaccard and occlusion accuracy, evaluated "query first", in pixels of
+//! the original image instead of one reduced to 256 × 256.
 //!
-//! What the names mean is in `docs/compare.md`; a test compares the page with [`NAMES`].
+//! `docs/compare.md` defines the metrics; a test compares the page with [`NAMES`].
 
 mod errors;
 mod tap_vid;
@@ -24,20 +24,20 @@ use crate::step::RunStep;
 use sightline_track::target::TrackingState;
 use sightline_world::target_truth::{StepTruth, TruthKind};
 
-/// What the protocol is called.
+/// The name of the protocol.
 pub(crate) const PROTOCOL: &str =
     "sightline, steps after the pick; average Jaccard and occlusion accuracy as TAP-Vid 2022, query first";
 
-/// The version of the protocol; another definition has another number.
+/// The version of the protocol; it changes with the definition of a metric.
 pub const VERSION: u32 = 1;
 
-/// Thresholds of the shares within a distance in the image, px (those of TAP-Vid).
+/// Thresholds for the fractions of steps within a distance in the image, px (as in TAP-Vid).
 pub(crate) const THRESHOLDS_PX: [f64; 5] = [1.0, 2.0, 4.0, 8.0, 16.0];
 
-/// Thresholds of the shares within a distance in space, cm.
+/// Thresholds for the fractions of steps within a distance in space, cm.
 pub(crate) const THRESHOLDS_CM: [f64; 4] = [1.0, 2.0, 5.0, 10.0];
 
-/// The names of all metrics, in their order.
+/// The names of all metrics, in output order.
 pub const NAMES: [&str; 24] = [
     "tracked_steps",
     "survival_steps",
@@ -68,51 +68,51 @@ pub const NAMES: [&str; 24] = [
 /// The metrics of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct RunMetrics {
-    /// What the protocol is called.
+    /// The name of the protocol.
     pub protocol: String,
     /// Its version.
     pub version: u32,
-    /// What the truth is; null where there is none.
+    /// The kind of truth; null without truth.
     pub truth: Option<TruthKind>,
-    /// Steps of the run so far, the pick included.
+    /// Number of steps of the run so far, the designation included.
     pub steps: usize,
-    /// Which steps were left out, and why.
+    /// The excluded steps, and why.
     pub excluded: Vec<Excluded>,
     /// The metrics, in the order of their names.
     pub metrics: Vec<Metric>,
-    /// Whether the covariances hold.
+    /// The consistency of the covariances.
     pub uncertainty: Uncertainty,
 }
 
-/// One number.
+/// A metric.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Metric {
     /// Its name.
     pub name: String,
-    /// Its unit; empty for shares, counts and squared Mahalanobis distances.
+    /// Its unit; empty for fractions, counts and squared Mahalanobis distances.
     pub unit: String,
-    /// Its value; null where it cannot be given.
+    /// Its value; null if it is not available, with the reason in `note`.
     pub value: Option<f64>,
-    /// How many steps it was made of.
+    /// Number of steps used.
     pub used: usize,
-    /// The step at which the run does worst by it; null where no step does badly.
+    /// The worst step by this metric; null if there is no bad step.
     pub worst_step: Option<usize>,
-    /// Why it cannot be given, or what should be known of it, as one sentence.
+    /// Why it has no value, or a remark on it, as one sentence; null without either.
     pub note: Option<String>,
 }
 
-/// Steps that were left out.
+/// Steps that were excluded from metrics.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Excluded {
-    /// Of which metrics.
+    /// The metrics from which they were excluded.
     pub of: String,
-    /// Why.
+    /// The reason.
     pub why: String,
     /// The steps.
     pub steps: Vec<usize>,
 }
 
-/// A step that counts.
+/// A step that is evaluated.
 struct Judged<'a> {
     trace: &'a RunStep,
     truth: Option<&'a StepTruth>,
@@ -124,12 +124,12 @@ impl Judged<'_> {
         self.trace.step
     }
 
-    /// The error in the image, where the truth is seen and something was located, px.
+    /// The error in the image, px; `None` if the truth is not visible or the target was not located.
     fn err_px(&self) -> Option<f64> {
         self.truth?.err_px
     }
 
-    /// Whether the truth is seen in the image.
+    /// Whether the true point is visible in the image.
     fn is_seen(&self) -> bool {
         self.truth.is_some_and(|truth| truth.left_pixel.is_some())
     }
@@ -206,7 +206,7 @@ fn excluded(
 }
 
 impl Metric {
-    /// A value of this metric as text without its unit; shares are in per cent.
+    /// A value of this metric as text without its unit; fractions are in per cent.
     pub fn words(&self, value: f64) -> String {
         let is_share = self.name.starts_with("pck_")
             || matches!(self.name.as_str(), "average_jaccard" | "occlusion_accuracy" | "inside_3_sigma");
@@ -227,7 +227,7 @@ impl Metric {
         Self { note, ..self }
     }
 
-    /// A metric that cannot be given.
+    /// A metric without a value.
     fn missing(name: impl Into<String>, unit: &str, why: &str) -> Self {
         Self::new(name, unit, None, 0, None).with_note(Some(why.to_owned()))
     }

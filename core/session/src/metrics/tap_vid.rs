@@ -2,20 +2,20 @@
 //!
 //! ```text
 //! J(δ) = TP / (TP + FP + FN)      AJ = mean of J(δ) over δ = 1, 2, 4, 8, 16 px
-//! TP   the truth is seen, the tracker says it is, and they are closer than δ
-//! FP   the tracker says it is seen, and the truth is hidden or not closer than δ
-//! FN   the truth is seen, and the tracker says it is not, or they are not closer than δ
-//! OA   the share of steps at which tracker and truth agree on whether it is seen
+//! TP   the truth is visible, the tracker reports it as visible, and they are closer than δ
+//! FP   the tracker reports it as visible, and the truth is hidden or not closer than δ
+//! FN   the truth is visible, and the tracker reports it as hidden, or they are not closer than δ
+//! OA   the fraction of steps at which tracker and truth agree on visibility
 //! ```
-//! A tracker that tracks says that it sees the point; one that is lost or has failed says that it does not. Where the truth
-//! is the first estimate carried along, nobody knows when the point is hidden, and the protocol does not apply.
+//! The state `tracking` reports the point as visible; `lost` and `failed` report it as hidden. If the truth is the first
+//! estimate propagated by the true poses, occlusion is unknown, and the protocol does not apply.
 
 use super::{Judged, Metric, THRESHOLDS_PX};
 use sightline_world::target_truth::TruthKind;
 
 const NAMES: [&str; 2] = ["average_jaccard", "occlusion_accuracy"];
 
-/// The two metrics.
+/// Average Jaccard and occlusion accuracy.
 pub(super) fn metrics(judged: &[Judged<'_>], truth: Option<TruthKind>) -> Vec<Metric> {
     let steps: Vec<&Judged<'_>> = judged.iter().filter(|step| step.truth.is_some()).collect();
     let why = match truth {
@@ -41,7 +41,7 @@ pub(super) fn metrics(judged: &[Judged<'_>], truth: Option<TruthKind>) -> Vec<Me
     NAMES.iter().map(|name| Metric::missing(*name, "", why)).collect()
 }
 
-/// J(δ); 1 where there was nothing to see and nothing was said to be seen.
+/// J(δ); 1 if the point was always hidden and reported as hidden.
 fn jaccard(steps: &[&Judged<'_>], threshold: f64) -> f64 {
     let (mut hit, mut wrong, mut missed) = (0.0, 0.0, 0.0);
     for step in steps {
@@ -55,7 +55,7 @@ fn jaccard(steps: &[&Judged<'_>], threshold: f64) -> f64 {
     if all == 0.0 { 1.0 } else { hit / all }
 }
 
-/// The step that costs most: seen where it is not, or the reverse, else the largest error beyond the smallest threshold.
+/// The worst step: one of wrong visibility, else the one with the largest error beyond the smallest threshold.
 fn worst(steps: &[&Judged<'_>]) -> Option<usize> {
     let cost = |step: &Judged<'_>| match (step.is_tracking, step.is_seen()) {
         (false, false) => 0.0,

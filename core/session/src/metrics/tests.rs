@@ -1,4 +1,4 @@
-//! Metrics of runs whose errors are written by hand.
+//! Metrics of runs with prescribed errors.
 
 use super::*;
 use crate::track;
@@ -7,7 +7,7 @@ use sightline_testing::{PlaneWorld, Trouble};
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
 
-/// What a later step was: its state, its error in px (none: the truth is hidden) and in m, and its NEES.
+/// A prescribed step after the designation: state, error in px (`None`: the truth is hidden) and m, and NEES.
 #[derive(Clone, Copy)]
 struct Said {
     state: TrackingState,
@@ -22,7 +22,7 @@ fn said(state: TrackingState, err_px: Option<f64>, err_m: f64) -> Said {
     Said { state, err_px, err_m, nees: 3.0 }
 }
 
-/// A tracked run of the plane with these truths written over it.
+/// A tracked run over the plane, with its states and truths replaced.
 fn run(later: &[Said]) -> Vec<Arc<RunStep>> {
     let world = PlaneWorld::new(vec![Pose::identity(), Pose::translation(0.3, 0.0, 0.0)]);
     let designation = Designation::new(0, Pixel::new(128.0, 120.0));
@@ -57,7 +57,7 @@ fn value(found: &RunMetrics, name: &str) -> f64 {
     metric(found, name).value.unwrap_or_else(|| panic!("{name}: {:?}", metric(found, name)))
 }
 
-/// Tracked with 0.5 and 3 px, hidden but said to be tracked, lost although right (1.5 px), tracked wrongly (20 px).
+/// Tracked with 0.5 and 3 px, tracked while hidden, falsely lost (1.5 px), falsely tracked (20 px).
 fn five() -> RunMetrics {
     use TrackingState::Tracking;
     metrics(&run(&[

@@ -1,16 +1,16 @@
-//! Whether the covariances of a run hold: NEES and NIS with their chi-square bands, coverage, and one sentence.
+//! Consistency of the covariances of a run: NEES and NIS with their chi-square bands, coverage, and one sentence.
 //!
 //! ```text
 //! NEES = eᵀ P⁻¹ e     e: error of the position, P: its covariance              χ² with 3 degrees of freedom
 //! NIS  = νᵀ S⁻¹ ν     ν = match − prediction, px;  S = Σ_pred + Σ_match        χ² with 2
 //! band of the mean over N steps: [χ²_dN(2.5 %), χ²_dN(97.5 %)] / N
 //! ```
-//! NEES needs the truth, NIS does not: it is what a rover can watch. NIS is over accepted updates of the template tracker;
-//! the other trackers move the earlier position and have no match that is independent of the prediction. The prediction's
-//! covariance and the match's share the drift of the template, so that a mean NIS below 2 is no fault by itself.
+//! NEES needs the truth; NIS does not, so a rover can monitor it. NIS is over accepted updates of the template tracker; the
+//! other trackers move the earlier position and have no match that is independent of the prediction. The covariances of
+//! prediction and match share the drift of the template, so a mean NIS below 2 alone is not a fault.
 //!
-//! The steps of one run are not independent (a template's error stays with it): the band for N independent steps is the
-//! narrowest that can be, that of a single value the widest. A mean between the two is reported with that doubt.
+//! The steps of one run are correlated through the error of the template. The band for N independent steps is the narrowest
+//! possible one, that of a single value the widest. A mean between the two is reported as `probably` too small or too large.
 //!
 //! Source: Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation (2001), 5.4.
 
@@ -23,26 +23,26 @@ use super::Metric;
 use crate::step::RunStep;
 use sightline_track::target::TrackingState;
 
-/// Degrees of freedom of a position in space.
+/// Degrees of freedom of a 3-D position.
 const OF_POSITION: f64 = 3.0;
 /// Degrees of freedom of a pixel.
 const OF_PIXEL: f64 = 2.0;
 
-/// How many standard deviations the coverage is given for.
+/// The Mahalanobis distances for which the coverage is computed.
 const SIGMAS: [f64; 8] = [0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0];
 
 const NO_NEES: &str = "NEES needs the truth, which this traverse does not have.";
 const NO_NIS: &str =
     "NIS needs a match that is independent of the prediction: only the template tracker has one.";
 
-/// Whether the covariances of a run hold.
+/// The consistency of the covariances of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Uncertainty {
     /// Squared Mahalanobis distance of the position's error, step by step.
     pub nees: Consistency,
     /// Squared Mahalanobis distance of the match from the prediction, step by step.
     pub nis: Consistency,
-    /// The share of steps within k standard deviations, against what is to be expected.
+    /// The fraction of steps within k standard deviations, with the expected fraction.
     pub coverage: Vec<Coverage>,
     /// The verdict on the covariances of the position.
     pub sentence: String,
@@ -53,15 +53,15 @@ pub struct Uncertainty {
 /// Squared Mahalanobis distances with their bands.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Consistency {
-    /// Degrees of freedom: what the mean should be.
+    /// Degrees of freedom; the expected mean.
     pub degrees_of_freedom: f64,
-    /// The steps that have one.
+    /// The steps with a value.
     pub steps: Vec<StepValue>,
     /// The 95 % band of a single value.
     pub band_of_one: [f64; 2],
-    /// Their mean; null without any.
+    /// The mean; null without values.
     pub mean: Option<f64>,
-    /// The 95 % band of the mean if the steps were independent; null without any.
+    /// The 95 % band of the mean for independent steps; null without values.
     pub band_of_mean: Option<[f64; 2]>,
 }
 
@@ -74,18 +74,18 @@ pub struct StepValue {
     pub value: f64,
 }
 
-/// How many errors lie within k standard deviations.
+/// The fraction of errors within a Mahalanobis distance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Coverage {
     /// The Mahalanobis distance.
     pub sigmas: f64,
-    /// The share of steps within it.
+    /// The fraction of steps within it.
     pub share: f64,
-    /// The share where the covariances are right.
+    /// The fraction expected for correct covariances.
     pub expected: f64,
 }
 
-/// The consistency of the steps that count.
+/// The consistency over the evaluated steps.
 pub(super) fn uncertainty<'a>(steps: impl Iterator<Item = &'a RunStep>) -> Uncertainty {
     let (mut errors, mut innovations) = (Vec::new(), Vec::new());
     for trace in steps {
@@ -99,7 +99,7 @@ pub(super) fn uncertainty<'a>(steps: impl Iterator<Item = &'a RunStep>) -> Uncer
     Uncertainty { coverage: coverage(&nees), nees, nis, sentence, nis_sentence }
 }
 
-/// The squared Mahalanobis distance of an accepted match from its prediction.
+/// The squared Mahalanobis distance of an accepted match from its prediction; `None` for other steps and trackers.
 pub fn nis(trace: &RunStep) -> Option<f64> {
     if trace.update.state != TrackingState::Tracking {
         return None;
@@ -113,7 +113,7 @@ pub fn nis(trace: &RunStep) -> Option<f64> {
     Some(innovation.dot(&(inverse * innovation))).filter(|value| value.is_finite())
 }
 
-/// The two-sided 95 % band of the mean of `count` independent values with that many degrees of freedom each.
+/// The two-sided 95 % band of the mean of `count` independent values, each with these degrees of freedom.
 pub fn band(degrees_of_freedom: f64, count: usize) -> Option<[f64; 2]> {
     let chi_squared = ChiSquared::new(degrees_of_freedom * count as f64).ok()?;
     Some([0.025, 0.975].map(|p| chi_squared.inverse_cdf(p) / count as f64))
@@ -137,7 +137,7 @@ impl Consistency {
         self.steps.iter().max_by(|a, b| a.value.total_cmp(&b.value)).map(|step| step.step)
     }
 
-    /// The verdict; none without values.
+    /// The verdict; `None` without values.
     fn sentence(&self, what: &str, name: &str) -> Option<String> {
         let (mean, [low, high]) = self.mean.zip(self.band_of_mean)?;
         let count = self.steps.len();

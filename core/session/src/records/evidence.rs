@@ -7,7 +7,7 @@ use sightline_record::Stage;
 use super::stages;
 use crate::step::RunStep;
 
-/// The evidence of a stage without that of the stages inside it; of a stage without evidence of its own its quantities.
+/// The evidence of a stage without that of nested stages; for a stage without its own evidence, its quantities.
 pub fn evidence(stage: &Stage<RunStep>, step: &RunStep) -> Value {
     let schema = stage.schema();
     let Some(mut evidence) = stage.evidence(step) else {
@@ -24,11 +24,11 @@ pub fn evidence(stage: &Stage<RunStep>, step: &RunStep) -> Value {
     evidence
 }
 
-/// The evidence that no quantity of the stage shows.
+/// The evidence that is not a quantity of the stage.
 pub fn rest(stage: &Stage<RunStep>, step: &RunStep) -> Value {
     let mut rest = evidence(stage, step);
     for quantity in &stage.schema().quantities {
-        // A record of several fields says more than a quantity of its name.
+        // A record of several fields contains more than the quantity with its name.
         remove(&mut rest, &quantity.name, |value| !value.is_object() || is_pixel(value));
     }
     drop_empty(&mut rest);
@@ -49,7 +49,7 @@ fn remove(tree: &mut Value, path: &str, is_meant: impl Fn(&Value) -> bool) {
     }
 }
 
-/// Removes records from which everything was taken.
+/// Removes records that have become empty.
 fn drop_empty(tree: &mut Value) {
     if let Some(fields) = tree.as_object_mut() {
         fields.values_mut().for_each(drop_empty);

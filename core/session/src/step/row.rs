@@ -1,4 +1,4 @@
-//! One step as a line of a table, with the declaration of its columns.
+//! One step as a row of a table, with the declaration of its columns.
 
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
@@ -9,7 +9,7 @@ use sightline_record::{Declaration, Record, Unit};
 use sightline_track::cycle_stage::CycleStage;
 use sightline_track::gate::Gate;
 
-/// One line of a run: the columns of plots, tables and `sightline track`.
+/// One row of a run: the columns of plots, tables and `sightline track`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct StepRow {
     /// The stop, from 0.
@@ -24,7 +24,7 @@ pub struct StepRow {
     pub ncc: Option<f64>,
     /// Score of point stereo.
     pub stereo_score: Option<f64>,
-    /// Features whose match agrees with the motion.
+    /// Number of feature matches that are inliers of the motion.
     pub inliers: Option<usize>,
     /// Confidence of the locator, 0 to 1.
     pub confidence: Option<f64>,
@@ -55,30 +55,30 @@ pub struct StepRow {
     pub position_correction_m: Option<f64>,
     /// Tolerance of the position's correction at this step, m.
     pub position_tolerance_m: Option<f64>,
-    /// What the paper's budget grants a drive without tracking at this range, m, 3σ (K-Eq 3).
+    /// The paper's error budget of a drive without tracking at this range, m, 3σ [Kim09 Eq. 3].
     pub budget_without_m: Option<f64>,
-    /// What the paper's budget grants tracking that drifts by half a pixel of the first image, m, 3σ (Kim09 Eq. 5).
+    /// The paper's error budget of tracking that drifts by half a pixel of the first image, m, 3σ [Kim09 Eq. 5].
     pub budget_with_m: Option<f64>,
-    /// Why an update was rejected, what is wrong with the stop's files, or where the drive is paused.
+    /// Why an update was rejected, the fault of the stop's files, or where the drive is paused.
     pub reason: Option<String>,
     /// Whether the stop's files are damaged, so that nothing could be done.
     #[serde(default)]
     pub fault: bool,
-    /// Whether the tracker did not look for the target; the schema leaves it out, as `reason` names why.
+    /// Whether the tracker did not search for the target; the schema omits it, because `reason` contains the cause.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     #[schema(ignore)]
     pub not_searched: bool,
     /// Rejected updates in a row up to this step while the state is `lost`; `None` in other states.
     ///
-    /// Expressions name the same value in the record (`update.state`), so the schema leaves it out.
+    /// The schema omits it, because expressions name the same value in the record (`update.state`).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(ignore)]
     pub lost_count: Option<u32>,
-    /// The first stage that is not computed, at a step of a paused drive; the schema leaves it out, as `reason` names it.
+    /// The first stage that is not computed, at a step of a paused drive; the schema omits it, because `reason` names it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(ignore)]
     pub paused_before: Option<CycleStage>,
-    /// The gates of the verdict that were not met; the schema leaves them out, as expressions name `judge.gates`.
+    /// The failed gates of the verdict; the schema omits them, because expressions name `judge.gates`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schema(ignore)]
     pub failed_gates: Vec<Gate>,

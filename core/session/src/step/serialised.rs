@@ -20,9 +20,9 @@ use sightline_track::trace::{StepKind, StepTrace};
 use sightline_track::verdict::Verdict;
 use sightline_world::target_truth::StepTruth;
 
-/// One step of a run. At the designation there is no `predict` and no `judge`; at a stop whose files are
-/// damaged there is a `fault` and nothing after `point_mast`. At a stop where a drive is paused, `begun` names the first stage that
-/// is not computed; this and the later ones are null.
+/// One step of a run. A designation has no `predict` and no `judge`; a stop with damaged files has a `fault` and no stages
+/// after `point_mast`. At a stop where a drive is paused, `begun` names the first stage that is not computed; this and the
+/// later stages are null.
 #[derive(Serialize, Deserialize, ToSchema)]
 #[schema(as = StepTrace)]
 struct SerialisedStep<'a> {
@@ -30,7 +30,7 @@ struct SerialisedStep<'a> {
     step: usize,
     /// Time since the first stop, s.
     time_s: f64,
-    /// What is wrong with the stop's files, as one sentence.
+    /// The fault of the stop's files, as one sentence; null without a fault.
     fault: Option<Cow<'a, str>>,
     /// Whether the mast is pointed at another target and this one is out of view; left out where it is not.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
@@ -53,19 +53,19 @@ struct SerialisedStep<'a> {
     /// How vision measured the motion to this stop; left out where it did not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     odometry: Option<Cow<'a, MeasuredMotion>>,
-    /// The comparison with the truth, where that is known.
+    /// The comparison with the truth; null if the truth is unknown.
     truth: Option<Cow<'a, StepTruth>>,
 }
 
-/// A step of a paused drive: where it is paused, and the values that stand in for stages that are not computed.
+/// A step of a paused drive: its pause, and the values in place of stages that are not computed.
 #[derive(Serialize, Deserialize, ToSchema)]
 #[schema(as = BegunStep)]
 struct SerialisedBegun<'a> {
     /// The first stage that is not computed.
     before: CycleStage,
-    /// The cameras with the mast as it is; null once it is pointed.
+    /// The cameras at the current mast angles; null once the mast is pointed.
     mast: Option<Cow<'a, Pointing>>,
-    /// The target carried by the prediction, with the last tracking state.
+    /// The target propagated by the prediction, with the last tracking state.
     carried: Cow<'a, Updated>,
 }
 
@@ -94,7 +94,7 @@ impl<'a> From<&'a RunStep> for SerialisedStep<'a> {
 }
 
 impl SerialisedStep<'_> {
-    /// The step; `None` where its stages are those of no kind of step.
+    /// The step; `None` if its stages do not form a valid kind of step.
     fn into_step(self) -> Option<RunStep> {
         let fault = self.fault.map(Cow::into_owned);
         let (predict, capture) = (self.predict.map(Cow::into_owned), self.capture.map(Cow::into_owned));

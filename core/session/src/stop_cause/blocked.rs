@@ -1,5 +1,5 @@
-//! Causes on the hazard map: ground beyond a limit under every path, an obstacle in the way of an approach, and obstacles that move with
-//! the rover.
+//! Causes on the hazard map: ground beyond a limit on every path, an obstacle that blocks an approach, and obstacles that
+//! move with the rover.
 
 use std::collections::BTreeMap;
 
@@ -10,21 +10,21 @@ use sightline_rover::hazards::{GoodnessCell, HazardTerm};
 use super::words::{listed, metres};
 use super::{Found, StopCause, StoppedDrive};
 
-/// Ground that is so much higher than it was measured at the stop before is other ground, m.
+/// Minimum rise of a cell since the previous stop that counts as risen, m.
 const RISEN_M: f32 = 0.1;
-/// Least number of risen cells at a stop: at the foot of a rock, which is seen better from near, up to nine rise.
+/// Minimum number of risen cells at a stop: up to nine rise at the foot of a rock, which is measured better from near.
 const RISEN_CELLS: usize = 10;
-/// At three of the last twenty stops: a rover that turns in front of it does not raise it at every stop.
+/// Cells must rise at `RISEN_STOPS` of the last `LAST_STOPS` stops; they do not rise at stops where the rover turns.
 const LAST_STOPS: usize = 20;
 const RISEN_STOPS: usize = 3;
 
 impl StoppedDrive<'_> {
-    /// The decision at the last stop, on its map.
+    /// The path choice at the last stop.
     fn choice(&self) -> Option<&PathChoice> {
         self.cycles.last()?.choice.as_ref()
     }
 
-    /// Ground that rises before the rover from stop to stop.
+    /// A false obstacle: ground ahead of the rover that rises from stop to stop.
     pub(super) fn false_obstacle(&self) -> Option<Found> {
         let stays = matches!(
             self.reason()?,
@@ -72,7 +72,7 @@ impl StoppedDrive<'_> {
         Some(Found { cause: StopCause::FalseObstacle, sentence, evidence: vec![where_is, what] })
     }
 
-    /// Ground beyond a limit under every path, or under every arc ahead of a rover that turns to and fro.
+    /// Ground beyond a limit on every path, or on every arc ahead of a rover that turns to and fro.
     pub(super) fn no_safe_path(&self) -> Option<Found> {
         let turns = self.stops_without_arc()?;
         let choice = self.choice().or_else(|| self.round()?.last()?.choice.as_ref())?;
@@ -104,7 +104,7 @@ impl StoppedDrive<'_> {
         Some(Found { cause: StopCause::NoSafePath, sentence, evidence })
     }
 
-    /// Something too high in the way of an approach.
+    /// An obstacle that blocks an approach.
     pub(super) fn approach_not_clear(&self) -> Option<Found> {
         let last = self.cycles.last()?;
         if self.reason()? != StopReason::NoSafePath || !self.command.is_approach(last.arrival_actions) {
@@ -124,8 +124,8 @@ impl StoppedDrive<'_> {
         Some(Found { cause: StopCause::NoSafePath, sentence, evidence: vec![arrived, others] })
     }
 
-    /// The stops between which a rover without a safe arc ahead turned to and fro: none if it stays. `None` if it has one, or ended for
-    /// another reason.
+    /// The stops between which a rover without a safe arc ahead turned to and fro; empty if it did not move. `None` if it
+    /// has a safe arc, or ended for another reason.
     fn stops_without_arc(&self) -> Option<Vec<usize>> {
         match self.reason()? {
             StopReason::NoSafePath => Some(Vec::new()),
@@ -144,7 +144,7 @@ impl StoppedDrive<'_> {
     }
 }
 
-/// That these vetoes of one term, among so many paths, leave none.
+/// The sentence for vetoes of one term that, among `count` paths, leave none.
 fn vetoed(vetoes: &[Veto], count: usize) -> Option<String> {
     let values = || vetoes.iter().map(|veto| veto.value);
     let (least, most) = (values().fold(f64::INFINITY, f64::min), values().fold(0.0, f64::max));
@@ -160,7 +160,7 @@ fn vetoed(vetoes: &[Veto], count: usize) -> Option<String> {
     ))
 }
 
-/// The failing cell that is nearest to its limit: the one that a person would look at.
+/// The sentence for the failing cell nearest to its limit.
 fn nearest(vetoes: &[Veto]) -> Option<String> {
     let least = vetoes.iter().min_by(|a, b| a.value.total_cmp(&b.value))?;
     let term = least.term;
@@ -182,7 +182,7 @@ pub(super) fn has_no_arc(choice: &PathChoice) -> bool {
     arcs.all(|candidate| candidate.veto.is_some())
 }
 
-/// Centres of the cells that are higher at a stop than they were measured at the one before, site frame, m.
+/// Centres of the cells that are higher than measured at the previous stop, site frame, m.
 fn risen_between(before: &StopHazards, now: &StopHazards) -> Vec<[f64; 2]> {
     let grid = &now.map.grid;
     let is_risen = |(at, cell): &([f64; 2], &GoodnessCell)| {

@@ -1,6 +1,6 @@
 //! Changes that alter the decision at the last stop: one field of the command, or one limit of the hazard map.
 //!
-//! Each change of the command is verified by deciding again with it, on the images and the map of that stop.
+//! Each change of the command is verified by repeating the decision with it, on the images and the map of that stop.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -20,11 +20,11 @@ use crate::format::number;
 /// A change that alters the decision.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct DecisionChange {
-    /// Field or setting, new value and present value.
+    /// Field or setting, new value and current value.
     pub text: String,
     /// The decision under the changed command or limit.
     pub decision: String,
-    /// The command with the change; null for a limit that is no part of a command.
+    /// The command with the change; null for a limit that is not part of a command.
     pub command: Option<DriveCommand>,
 }
 
@@ -57,7 +57,7 @@ impl StoppedDrive<'_> {
         all
     }
 
-    /// The change with its decision, if that is another.
+    /// The change with its decision; `None` if the reason of the ending stays the same.
     fn verified(&self, ending: &Ending, (text, command): (String, DriveCommand)) -> Option<DecisionChange> {
         command.validate().ok()?;
         let decided = self.decide(&command)?;
@@ -87,7 +87,7 @@ impl StoppedDrive<'_> {
         Some(executive::decide(self.stops, &input))
     }
 
-    /// Limits of the hazard map with which paths are open.
+    /// Changes of limits of the hazard map that open paths.
     pub(super) fn of_limits(&self) -> Vec<DecisionChange> {
         let preset = match self.command.navigator {
             NavigatorKind::Arcs => return Vec::new(),
@@ -117,7 +117,7 @@ impl StoppedDrive<'_> {
     }
 }
 
-/// Changes of the field whose check ended the drive.
+/// Changes of the fields whose check ended the drive.
 fn of_reason(command: &DriveCommand, ending: &Ending) -> Vec<(String, DriveCommand)> {
     let with_number = |name: &str, values: [f64; 2], change: &dyn Fn(&mut DriveCommand)| {
         changed(command, name, values.map(number), change)
@@ -158,7 +158,7 @@ fn of_reason(command: &DriveCommand, ending: &Ending) -> Vec<(String, DriveComma
     }
 }
 
-/// A change of one field, with its new and present value in words.
+/// A change of one field, with its new and current value in words.
 fn changed(
     command: &DriveCommand,
     name: &str,
@@ -170,7 +170,7 @@ fn changed(
     (format!("{name} {new} instead of {old}"), changed)
 }
 
-/// The next multiple of a step above a value.
+/// The next multiple of `step` above `value`.
 fn raised(value: f64, step: f64) -> f64 {
     ((value / step).floor() + 1.0) * step
 }

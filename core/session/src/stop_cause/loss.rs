@@ -1,4 +1,4 @@
-//! Why the target of a drive was lost: the root cause of the first of the updates that were rejected in a row.
+//! Why the target of a drive was lost: the root cause of the first of the last consecutive rejected updates.
 
 use std::sync::Arc;
 
@@ -8,9 +8,9 @@ use sightline_track::settings::Settings;
 use crate::step::RunStep;
 use crate::why::Book;
 
-/// The stop of that update with its root cause, and its evidence; `None` if the last update was accepted.
+/// The stop of that update with its root cause, and its evidence; `None` if the last update was good.
 ///
-/// The steps are looked at without their comparison with the truth.
+/// The comparison with the truth is not used.
 pub(super) fn loss(
     traverse: &Traverse,
     steps: &[Arc<RunStep>],

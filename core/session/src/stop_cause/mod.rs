@@ -2,20 +2,20 @@
 //!
 //! | reason of the stop | cause | evidence |
 //! |---|---|---|
-//! | `slip` | `order_of_events` | the time was used up during the motion, and the slip of what the wheels drove is within the limit |
-//! | any but `arrived` | `featureless_ground` | visual odometry refused its last motions for want of points or matches |
-//! | any but `arrived` | `repeating_ground` | … because another motion fits as well |
-//! | no way on | `false_obstacle` | ground rises before the rover from stop to stop (`blocked`) |
-//! | `no_safe_path` in an approach after arrival | `no_safe_path` | the obstacle in its way (`blocked`) |
-//! | `no_safe_path`, or `limit_cycle` or `goal_blocked` without a safe arc | `no_safe_path` | the term that vetoes most paths, and by how much |
-//! | `limit_cycle` | `limit_cycle` | the stops at one place, and what moves the rover away from the goal there |
+//! | `slip` | `order_of_events` | the time ran out during the motion; the slip of the wheel motion is within the limit |
+//! | any but `arrived` | `featureless_ground` | visual odometry refused its last motions for lack of points or matches |
+//! | any but `arrived` | `repeating_ground` | … because another motion fits equally well |
+//! | blocked | `false_obstacle` | ground ahead of the rover rises from stop to stop (`blocked`) |
+//! | `no_safe_path` in an approach after arrival | `no_safe_path` | the obstacle that blocks it (`blocked`) |
+//! | `no_safe_path`, or `limit_cycle` or `goal_blocked` without a safe arc | `no_safe_path` | the most frequent veto |
+//! | `limit_cycle` | `limit_cycle` | the stops at one place, and the motions between them |
 //!
-//! A drive whose target was lost has the root cause of that loss as its sentence (`loss`), and no cause of its own.
+//! If the target of a drive was lost and no cause of this table applies, the sentence is the cause of the loss (`loss`).
 //!
-//! *No way on*: `no_safe_path`, `goal_blocked`, `limit_cycle`, `stop_limit`, `time`. Estimates, decisions and results of the stages are
-//! the only input: neither scenario nor truth.
+//! *Blocked*: `no_safe_path`, `goal_blocked`, `limit_cycle`, `stop_limit`, `time`. The inputs are estimates, decisions and
+//! results of the stages; scenario and truth are not used.
 //!
-//! Source: driving.md 3; the rules are ours.
+//! Source: docs/driving.md, *Why a drive stopped*; the rules are ours.
 
 mod blocked;
 mod changes;
@@ -44,17 +44,17 @@ use crate::step::RunStep;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum StopCause {
-    /// The ground exceeds a limit under every path.
+    /// The ground exceeds a limit on every path.
     NoSafePath,
     /// The obstacle moves with the rover: a false match, or a part of the rover.
     FalseObstacle,
-    /// The same decisions repeat at the same place.
+    /// The same decisions repeat at the same position.
     LimitCycle,
-    /// A check compared with a motion that an earlier event had ended.
+    /// A check used the whole command although an earlier event had ended the motion.
     OrderOfEvents,
     /// The ground has too little texture for visual odometry.
     FeaturelessGround,
-    /// The ground repeats itself, so that visual odometry has more than one solution.
+    /// The ground has a repeating texture, so that visual odometry has more than one solution.
     RepeatingGround,
 }
 
@@ -63,11 +63,11 @@ pub enum StopCause {
 pub struct StopExplanation {
     /// The stop.
     pub step: usize,
-    /// The reason that the drive gives.
+    /// The reason that the drive reports.
     pub reason: StopReason,
-    /// The root cause; null where the evidence supports none beside the reason.
+    /// The root cause; null if the evidence supports none.
     pub cause: Option<StopCause>,
-    /// The cause as a sentence; without a cause, the reason.
+    /// The cause as a sentence; without a cause, the root cause of a loss, else the reason.
     pub sentence: String,
     /// Further sentences of evidence.
     pub evidence: Vec<String>,
@@ -75,34 +75,34 @@ pub struct StopExplanation {
     pub changes: Vec<DecisionChange>,
 }
 
-/// What an explanation is made from: a drive up to the stop at which it ended.
+/// The inputs of an explanation: a drive up to the stop at which it ended.
 #[derive(Clone, Copy)]
 struct StoppedDrive<'a> {
     stops: &'a dyn Stops,
     command: &'a DriveCommand,
-    /// The first at the designation.
+    /// The steps; the first is the designation.
     steps: &'a [&'a StepTrace],
     /// The decisions at their stops.
     cycles: &'a [Cycle],
-    /// The hazard maps of these stops; empty with a navigator without one.
+    /// The hazard maps of these stops; empty for a navigator without maps.
     hazards: &'a [Arc<StopHazards>],
 }
 
-/// A cause with its words.
+/// A cause with its sentences.
 struct Found {
     cause: StopCause,
     sentence: String,
     evidence: Vec<String>,
 }
 
-/// The explanation of the last drive that was asked for, which is kept: deciding again takes up to seconds.
+/// A cache of the last explanation: computing one takes up to seconds.
 #[derive(Debug, Default)]
 pub struct Explained {
     last: Option<(DriveCommand, Vec<Cycle>, Option<StopExplanation>)>,
 }
 
 impl Explained {
-    /// Why a drive with these steps and decisions stopped; `None` while it goes on, and where it has arrived.
+    /// Why a drive with these steps and decisions stopped; `None` while it goes on, and after it was completed.
     pub(crate) fn of(
         &mut self,
         stops: &Traverse,
@@ -125,7 +125,7 @@ impl Explained {
         let lost = is_lost.then(|| loss::loss(stops, steps, settings)).flatten();
         let steps: Vec<&StepTrace> = steps.iter().map(|step| &step.trace).collect();
         let map = |step: &&StepTrace| {
-            // Never cancelled: the decisions were made on these maps.
+            // Never cancelled: these maps already exist, because the decisions used them.
             maps.at(stops, command, [steps[0], step], Cancel::default()).ok().flatten()
         };
         let hazards: Vec<Arc<StopHazards>> = steps.iter().map_while(map).collect();
@@ -173,7 +173,7 @@ impl StoppedDrive<'_> {
         Some(self.cycles.last()?.ending.as_ref()?.reason)
     }
 
-    /// The decisions since the visit before the last one to one place.
+    /// The decisions of the last round: since the rover's previous visit to its current place.
     fn round(&self) -> Option<Vec<&Cycle>> {
         let last = self.cycles.last()?.step;
         let visits = visits(self.stops, [self.since()?, last]);
@@ -181,7 +181,7 @@ impl StoppedDrive<'_> {
         Some(self.cycles.iter().filter(|cycle| (before..last).contains(&cycle.step)).collect())
     }
 
-    /// Stops at one place, and what keeps the rover from the goal there.
+    /// A limit cycle: the stops at one place, and the motions of the last round.
     fn limit_cycle(&self) -> Option<Found> {
         let last = self.cycles.last()?;
         if self.reason()? != StopReason::LimitCycle {
@@ -207,7 +207,7 @@ impl StoppedDrive<'_> {
         Some(Found { cause: StopCause::LimitCycle, sentence, evidence })
     }
 
-    /// By how much the motions of a round ended beside their commanded ends.
+    /// The largest distance between the ends of a round's motions and their commanded ends, as a sentence.
     fn missed(&self, round: &[&Cycle]) -> Option<String> {
         let miss_m = |cycle: &&Cycle| {
             let ([ahead, right], _) = cycle.motion.as_ref()?.after(cycle.time_up_after.unwrap_or(1.0));

@@ -1,4 +1,4 @@
-//! Causes in the measurement of the motion: a check after the motion was ended, and ground on which vision measures nothing.
+//! Causes in the measurement of motion: a check after the motion was ended early, and ground on which visual odometry fails.
 
 use sightline_rover::driving::ending::refusals;
 use sightline_rover::driving::{SlipCheck, StopReason};
@@ -9,13 +9,13 @@ use super::{Found, StopCause, StoppedDrive};
 use crate::format::number;
 use crate::why::odometry::refusal;
 
-/// So many refused motions in a row are no chance.
+/// Minimum number of consecutive refused motions.
 const REFUSALS_MIN: usize = 3;
-/// Gates that fail where other motions fit as well.
+/// Gates that fail if another motion fits equally well.
 const OF_REPETITION: [&str; 2] = ["odometry_ambiguity", "odometry_repetition"];
 
 impl StoppedDrive<'_> {
-    /// A slip that only reflects that the motion was ended early.
+    /// A slip value that only reflects the early end of the motion.
     pub(super) fn order_of_events(&self) -> Option<Found> {
         let last = self.cycles.last()?;
         let ending = last.ending.as_ref().filter(|ending| ending.reason == StopReason::Slip)?;
@@ -64,7 +64,7 @@ impl StoppedDrive<'_> {
         let repeats = |measured: &MeasuredMotion| {
             let failed =
                 |name: &str| measured.update.gates.iter().any(|gate| gate.name == name && !gate.passed);
-            // Through a few points more than one motion fits anyway.
+            // With few points, more than one motion always fits.
             OF_REPETITION.into_iter().any(failed) && !failed("odometry_inliers")
         };
         let repeating = refused.iter().filter(|(_, measured)| repeats(measured)).count();

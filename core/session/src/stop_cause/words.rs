@@ -1,10 +1,10 @@
-//! Motions and ends of a drive in words.
+//! Motions and endings of a drive in words.
 
 use sightline_rover::driving::{Ending, Motion};
 
 use crate::format::number;
 
-/// A motion as a person would tell it.
+/// A motion in words.
 pub fn motion(motion: &Motion) -> String {
     let side = |value: f64| if value > 0.0 { "right" } else { "left" };
     match *motion {
@@ -14,7 +14,7 @@ pub fn motion(motion: &Motion) -> String {
         Motion::Arc { length_m, curvature_per_m } => {
             let way = if length_m < 0.0 { "back" } else { "ahead" };
             let length = format!("{} m {way}", number(length_m.abs()));
-            // Straighter than that nobody can tell.
+            // Radii above 1 km are shown as straight.
             if curvature_per_m.abs() < 1e-3 {
                 return length;
             }
@@ -23,7 +23,7 @@ pub fn motion(motion: &Motion) -> String {
     }
 }
 
-/// The end of a drive as a sentence.
+/// The ending of a drive as a sentence.
 pub(super) fn ended(ending: &Ending) -> String {
     let reason = super::super::why::words::capitalised(ending.reason.word());
     match (&ending.detail, ending.value, ending.limit) {
@@ -33,12 +33,12 @@ pub(super) fn ended(ending: &Ending) -> String {
     }
 }
 
-/// A length.
+/// A length in m, or in cm below 1 m.
 pub(super) fn metres(value_m: f64) -> String {
     if value_m.abs() < 1.0 { format!("{:.1} cm", 100.0 * value_m) } else { format!("{value_m:.2} m") }
 }
 
-/// Numbers behind their noun: "stop 3", "stops 3 and 4", "stops 3, 4 and 7".
+/// Numbers after their noun: "stop 3", "stops 3 and 4", "stops 3, 4 and 7".
 pub(super) fn listed(noun: &str, numbers: &[usize]) -> String {
     let words: Vec<String> = numbers.iter().map(ToString::to_string).collect();
     match words.split_last() {

@@ -1,15 +1,15 @@
-//! The root cause of a rejected update, found without the truth; none where the evidence supports none.
+//! The root cause of a rejected update, found without the truth.
 //!
 //! | order | cause | evidence |
 //! |---|---|---|
-//! | 1 | a jump of heading or position | `jump`: no earlier step changes like that, and the target leaves the search window |
-//! | 2 | an earlier loss | bad updates in a row, without a jump of the pose since |
-//! | 3 | the target leaves an image | the template does not fit around the prediction |
-//! | 4 | nothing was matched | the reason of the tracker |
-//! | 5 | slip measured by vision | `odometry`: the pose used is significantly elsewhere |
+//! | 1 | a jump of heading or position | `jump`: an unusual change that moves the target out of the search window |
+//! | 2 | an earlier loss | consecutive bad updates, without a jump of the pose since |
+//! | 3 | the target leaves an image | the template does not fit into the image at the prediction |
+//! | 4 | nothing was matched | the reason that the tracker reports |
+//! | 5 | slip measured by visual odometry | `odometry`: the pose used differs significantly |
 //! | 6 | no contrast | nearly all positions are flat |
-//! | 7 | a search window that is too small | a poor score that rises towards its rim |
-//! | 8 | a hidden or changed target | the score fell in one step, prediction and change of pose being consistent |
+//! | 7 | a search window that is too small | a poor score that rises towards the edge of the window |
+//! | 8 | a hidden or changed target | the score fell in one step, with consistent prediction and pose change |
 //! | 9 | the right image | a good match, a poor stereo score |
 //! | 10 | slip, or a match or range on another surface | a good match, range or site position beyond its tolerance |
 //! | 11 | an ambiguous match | a good match, a second peak beyond its gate |
@@ -26,28 +26,28 @@ use super::words::{number, signed};
 use super::{Book, leaving, odometry};
 use crate::metrics::uncertainty::nis;
 
-/// The headline without a cause.
+/// The headline if no cause is found.
 pub(super) const NONE: &str = "No single cause is visible";
 
-/// A score that falls by more in one step did not wear out.
+/// Minimum fall of the score in one step that is not gradual degradation.
 const FALL: f64 = 0.15;
-/// A match within so many standard deviations of its prediction is consistent with it.
+/// Maximum distance of a match from its prediction that counts as consistent, standard deviations.
 const CONSISTENT_SIGMAS: f64 = 3.0;
-/// A range change of more than so many times the way since the last update is no slip.
+/// Maximum range change that slip explains, as a multiple of the distance driven since the last update.
 const SLIP_SHARE: f64 = 1.2;
-/// A relative change of the mean grey value that changes how the target looks.
+/// Minimum relative change of the mean grey value that counts as a change of illumination.
 const BRIGHTNESS: f64 = 0.25;
-/// A search window with a larger share of flat positions has no contrast.
+/// Minimum fraction of flat positions of a search window without contrast.
 const FLAT: f64 = 0.9;
-/// A larger saturated share hides the texture.
+/// Fraction of saturated pixels above which the texture is hidden.
 const SATURATED: f64 = 0.1;
 
 /// The root cause of a rejected update.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Cause {
-    /// The cause as a sentence without its stop.
+    /// The cause as a sentence without a full stop.
     pub(super) sentence: String,
-    /// The evidence beside it, as a clause.
+    /// Additional evidence, as a clause.
     pub(super) evidence: Option<String>,
     /// Whether the rover may have slipped.
     pub(super) is_slip: bool,
@@ -63,7 +63,7 @@ impl Cause {
     }
 }
 
-/// The cause of a rejected update; `None` where the evidence supports none.
+/// Finds the cause of a rejected update; `None` if the evidence supports none.
 pub(super) fn find(book: &Book<'_>, verdict: &Verdict) -> Option<Cause> {
     let rejected_before = match verdict.state_before {
         TrackingState::Lost { count } => count as usize,
@@ -84,7 +84,7 @@ pub(super) fn find(book: &Book<'_>, verdict: &Verdict) -> Option<Cause> {
     found.or_else(|| of_match(book, verdict))
 }
 
-/// That the target was lost at an earlier update.
+/// The cause that the target was lost at an earlier update; `None` if it was not.
 fn earlier(rejected_before: usize) -> Option<Cause> {
     let words = match rejected_before {
         0 => return None,
@@ -124,7 +124,7 @@ fn of_jump(book: &Book<'_>, jump: Jump) -> Cause {
     Cause { evidence: Some(usual), ..Cause::new(format!("{what}; {effect}")) }
 }
 
-/// What the match itself says.
+/// The causes 6 to 11, from the match itself.
 fn of_match(book: &Book<'_>, verdict: &Verdict) -> Option<Cause> {
     let matched = book.trace.template()?.match_template.as_ref()?;
     let failed = |name: &str| verdict.gates.iter().find(|gate| gate.name == name && !gate.passed);
@@ -132,7 +132,7 @@ fn of_match(book: &Book<'_>, verdict: &Verdict) -> Option<Cause> {
     if let Some(cause) = poor.or_else(|| fallen(book)) {
         return Some(cause);
     }
-    // The gate of far matches fails with those of the position, whose consequence it is.
+    // `far_ncc` is checked after the gates of the position, whose failures cause it.
     if failed("ncc").is_some() {
         return None;
     }
@@ -174,7 +174,7 @@ fn of_match(book: &Book<'_>, verdict: &Verdict) -> Option<Cause> {
     second.or_else(|| at_rim(book))
 }
 
-/// A good match at an unexpected distance.
+/// A good match at an unexpected range.
 fn of_range(book: &Book<'_>, gate: &Gate) -> Option<Cause> {
     let change_m = book.range_located_m()? - book.predicted_range_m()?;
     let way_m = book.trace.prediction()?.travelled_since_update_m;
@@ -197,7 +197,7 @@ fn of_range(book: &Book<'_>, gate: &Gate) -> Option<Cause> {
     })
 }
 
-/// A search window in which nearly nothing can be compared.
+/// A search window without contrast, in which nearly no position can be compared.
 fn without_contrast(matched: &TemplateMatch) -> Option<Cause> {
     let share = f64::from(matched.flat_positions) / f64::from(matched.positions.max(1));
     (share >= FLAT).then(|| {
@@ -208,12 +208,12 @@ fn without_contrast(matched: &TemplateMatch) -> Option<Cause> {
     })
 }
 
-/// A peak at the rim of the positions compared.
+/// A peak at the edge of the compared positions.
 fn at_rim(book: &Book<'_>) -> Option<Cause> {
     let matched = book.trace.template()?.match_template.as_ref()?;
     let rim_px = edge_distance_px(matched, book.settings.template.template_size_px);
     let predicted = book.trace.point_mast.predicted_left?;
-    // A poor peak at the rim may be chance: it must score better than half of what is asked.
+    // A poor peak at the edge may be due to chance: its score must exceed half the required one.
     let is_rising = matched.score > 0.5 * book.settings.limits.ncc_min;
     (matched.descent.is_none() && rim_px <= AT_RIM_PX && is_rising).then(|| {
         Cause::slip(format!(
@@ -223,7 +223,7 @@ fn at_rim(book: &Book<'_>) -> Option<Cause> {
     })
 }
 
-/// A score that fell in one step although the target is where it was expected.
+/// A score that fell in one step although pose and prediction are consistent.
 fn fallen(book: &Book<'_>) -> Option<Cause> {
     let before = book.before?;
     let score = |step: &crate::step::RunStep| Some(step.template()?.match_template.as_ref()?.score);
@@ -241,7 +241,7 @@ fn fallen(book: &Book<'_>) -> Option<Cause> {
     }))
 }
 
-/// A change of light on the subframe, as a clause.
+/// A change of illumination of the subframe, as a clause.
 fn brightness(book: &Book<'_>) -> Option<String> {
     let now = book.trace.capture()?;
     if let Some(share) = now.subframe_saturated.map(f64::from).filter(|share| *share > SATURATED) {

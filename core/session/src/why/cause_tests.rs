@@ -1,4 +1,4 @@
-//! The cause of a loss is the trouble that the world has, told without the truth; a step without a trouble has none.
+//! The cause of a loss, found without the truth, is the trouble of the world; a step without a trouble has no cause.
 
 use nalgebra::UnitQuaternion;
 use serde_json::{Value, json};
@@ -10,9 +10,9 @@ use sightline_testing::{PlaneWorld, Trouble};
 use sightline_track::settings::Changes;
 use sightline_track::target::Designation;
 
-/// The stop at which something goes wrong.
+/// The stop of the trouble.
 const STEP: usize = 4;
-/// A turn per step that brings the target to the edge of the right image at that stop, deg.
+/// Turn per step that moves the target to the edge of the right image at that stop, deg.
 const TURN_DEG: f64 = 2.0;
 
 fn poses() -> Vec<Pose> {
@@ -33,7 +33,7 @@ fn with_heading_jump(deg: f64) -> PlaneWorld {
     world
 }
 
-/// The summary of a step after the defaults were used up to [`STEP`], without the truth.
+/// The summary of a step without the truth; `changes` apply from [`STEP`] on.
 fn summary_at(world: &PlaneWorld, step: usize, changes: &[(&str, Value)]) -> sentence::Summary {
     let changes: Changes = changes.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect();
     let settings = Settings::default().with(&changes).unwrap();
@@ -51,7 +51,7 @@ fn summary_at(world: &PlaneWorld, step: usize, changes: &[(&str, Value)]) -> sen
     Book { trace: &steps[step], before, settings: &settings, prediction_px: None, sources: world }.summary()
 }
 
-/// A search window that the jumps leave and the usual errors do not.
+/// A search window that contains the target for usual errors, but not after a jump.
 fn narrow() -> [(&'static str, Value); 1] {
     [("search_window_px", json!(81))]
 }
@@ -114,7 +114,7 @@ fn a_covered_target_is_named_as_a_window_without_contrast() {
         summary.headline.starts_with("The search window has no contrast: 100 % of its positions are flat"),
         "{summary:?}"
     );
-    // The step after it is lost for the same reason, which is told at the first.
+    // The next step is lost for the same reason, which is explained at the first one.
     world.troubles[STEP + 1] = Trouble::Covered;
     let summary = summary_at(&world, STEP + 1, &[]);
     assert!(summary.headline.starts_with("The target was lost at the update before"), "{summary:?}");
@@ -122,7 +122,7 @@ fn a_covered_target_is_named_as_a_window_without_contrast() {
 
 #[test]
 fn a_target_that_leaves_an_image_is_named_with_the_edge() {
-    // A steady turn to the right carries the target to the left edge, which it reaches in the right image first or later.
+    // A steady turn to the right moves the target towards the left edge of both images.
     let turning = |deg: f64| {
         let mut world = PlaneWorld::new(poses());
         for stop in 0..6 {
@@ -146,7 +146,7 @@ fn a_step_without_a_trouble_has_no_cause() {
     let summary = summary_at(&PlaneWorld::new(poses()), STEP, &strict);
     assert_eq!(summary.headline, "No single cause is visible.", "{summary:?}");
     assert!(summary.bullets[0].starts_with("Rejected: match σ "), "{summary:?}");
-    // A rover that truly turns on an arc is no jump, and a jump inside the search window is no cause.
+    // A true turn on an arc is not a jump, and a jump inside the search window is not a cause.
     let mut world = PlaneWorld::new(poses());
     for stop in STEP..6 {
         world.true_poses[stop] = turned(&(poses()[STEP - 1] * Pose::translation(0.4, 0.021, 0.0)), 6.0);

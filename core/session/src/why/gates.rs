@@ -1,4 +1,4 @@
-//! The gates of a step in Why: value, limit and margin.
+//! The gates of a step in explanations: value, limit and margin.
 
 use std::sync::LazyLock;
 
@@ -9,24 +9,24 @@ use sightline_track::gate::GateKind;
 use sightline_track::locate::gate_kinds;
 use sightline_track::stages::judge::Gate;
 
-/// The display name of a gate: its label where it is declared, the one table of these names.
+/// The display name of a gate: the label of its declaration; for an unknown gate its name.
 pub fn label(name: &str) -> &str {
     static KINDS: LazyLock<Vec<GateKind>> = LazyLock::new(gate_kinds);
     let mut all = KINDS.iter().chain(visual_odometry::gate_kinds());
     all.find(|kind| kind.name == name).map_or(name, |kind| kind.label)
 }
 
-/// A criterion with how it compares with the others.
+/// A gate with its relative margin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Margin<'a> {
-    /// The criterion.
+    /// The gate.
     pub gate: &'a Gate,
-    /// Its margin over the size of its limit, so that criteria of different units can be compared; the worst possible
-    /// where there was nothing to judge.
+    /// Its margin over the magnitude of its limit, which makes gates of different units comparable; −∞ if there was nothing
+    /// to judge.
     pub relative: f64,
 }
 
-/// The criteria, worst margin first; those alike in the order of the paper.
+/// The gates, worst margin first; equal ones in the order of the paper.
 pub fn by_margin(gates: &[Gate]) -> Vec<Margin<'_>> {
     let margin = |gate| Margin { gate, relative: relative_margin(gate) };
     let mut margins: Vec<Margin<'_>> = gates.iter().map(margin).collect();
@@ -39,7 +39,7 @@ fn relative_margin(gate: &Gate) -> f64 {
     gate.margin.map_or(f64::NEG_INFINITY, |margin| margin / size)
 }
 
-/// The value that a criterion judges.
+/// The name of the value that a gate judges.
 pub(super) fn judged(gate: &str) -> &str {
     match gate {
         "stereo_ncc" => "stereo_score",
@@ -54,7 +54,7 @@ impl Book<'_> {
         judged.find(|gate| gate.name == name).or_else(|| self.odometry_gate(name))
     }
 
-    /// A criterion: its margin.
+    /// The margin of a gate.
     pub(super) fn gate(&self, name: &str) -> Option<Draft> {
         let gate = self.find_gate(name)?;
         let word = if gate.passed { "pass" } else { "FAIL" };
@@ -71,7 +71,7 @@ impl Book<'_> {
         })
     }
 
-    /// What a criterion judges: the value as it stood when it was judged.
+    /// The value of a gate at the time of judgement.
     pub(super) fn gate_value(&self, name: &str) -> Option<Draft> {
         let gate = self.find_gate(name)?;
         let Some(value) = gate.value else {
@@ -83,7 +83,7 @@ impl Book<'_> {
             let why = missing.unwrap_or_else(|| "nothing was found to judge".to_owned());
             return Some(Draft::text(judge, name, "none").roughly(&why, &[judged(name)]));
         };
-        // The same number under its own name; where it has none, its own words.
+        // The explanation of the same value under its own name, if it has one.
         let own = self
             .odometry_value(gate)
             .or_else(|| self.of_template(judged(name)))

@@ -1,13 +1,14 @@
-//! A jump of the pose estimate: a change of heading or direction that no earlier step of the drive has and that moves the target
-//! out of the search window. No truth is used.
+//! A jump of the pose estimate: a change of heading or direction that no earlier step of the drive has and that moves the
+//! target out of the search window. No truth is used.
 //!
 //! ```text
-//! │x_s − m│ > max(6 s, x_min)      m, s: median and robust spread of the same change at up to eight steps before
+//! │x_s − m│ > max(6 s, 2 d, x_min)      m, d: median and largest deviation of x at up to eight earlier steps
+//! s² = (1.4826 MAD)² + σ²               MAD of the same values; σ by the error model of the pose estimates
 //! ```
-//! x is the change of yaw, or the direction of the translation in the rover frame of the stop before. A rover that turns on an arc
-//! moves along the chord, half the change of yaw aside: a change of yaw without one is no turn of the wheels. With the usual
-//! value in place of x_s the target would be predicted elsewhere: only if that place is outside the positions searched is the jump
-//! a cause.
+//! x is the change of yaw, or the direction of the translation in the rover frame of the previous stop. A rover on an arc
+//! moves along the chord, whose direction is half the change of yaw: a change of yaw without that direction is not a turn of
+//! the rover. With the usual value in place of x_s the target would be predicted elsewhere: the jump is a cause only if that
+//! position is outside the searched positions.
 
 use nalgebra::{Rotation3, Vector3};
 use sightline_geometry::frames::{Pixel, Pose, attitude_from_roll_pitch_yaw};
@@ -17,19 +18,19 @@ use super::pose_change::components;
 use crate::step::RunStep;
 use sightline_vision::image::PixelRect;
 
-/// Maximum number of earlier steps with which one is compared.
+/// Maximum number of earlier steps for comparison.
 const HISTORY: usize = 8;
-/// Their minimum number.
+/// Minimum number of earlier steps for comparison.
 const HISTORY_MIN: usize = 2;
-/// A deviation of so many spreads is no usual one.
+/// Minimum deviation of a jump, in robust standard deviations.
 const SPREADS: f64 = 6.0;
-/// Smaller changes of yaw are no jump, deg.
+/// Minimum deviation of the yaw change that counts as a jump, deg.
 const YAW_MIN_DEG: f64 = 1.5;
-/// Smaller changes of direction are no jump, deg.
+/// Minimum deviation of the direction that counts as a jump, deg.
 const DIRECTION_MIN_DEG: f64 = 8.0;
-/// The direction of the chord on an arc is half the change of yaw; below this share the rover drove straight.
+/// Ratio of chord direction to yaw change below which the rover drove straight; on an arc it is 0.5.
 const CHORD_SHARE: f64 = 0.4;
-/// Shorter translations have no direction, m.
+/// Minimum translation with a direction, m.
 const WAY_MIN_M: f64 = 0.02;
 
 /// The quantity that jumped.
@@ -37,7 +38,7 @@ const WAY_MIN_M: f64 = 0.02;
 pub(super) enum Jumped {
     /// The heading, while the rover drove straight.
     Heading,
-    /// The position, to a side.
+    /// The position, sideways.
     Position,
 }
 
@@ -46,23 +47,23 @@ pub(super) enum Jumped {
 pub(super) struct Jump {
     /// The stop at which the estimate jumps.
     pub(super) stop: usize,
-    /// What jumps.
+    /// The quantity that jumps.
     pub(super) jumped: Jumped,
     /// Deviation from the usual change: deg for the heading, m for the position; positive to the right.
     pub(super) by: f64,
-    /// The largest deviation of the earlier steps, same unit.
+    /// The largest deviation at the earlier steps, in the unit of `by`.
     pub(super) usual: f64,
-    /// Distance of the prediction from where it would be without the jump, px; `None` outside the view of the camera.
+    /// Distance between the predictions with and without the jump, px; `None` if the latter is outside the camera's view.
     pub(super) shift_px: Option<f64>,
 }
 
-/// One step's change of pose.
+/// The pose change of one step.
 #[derive(Clone, Copy)]
 struct Change {
     before_from_after: Pose,
     way_m: f64,
     yaw_deg: f64,
-    /// Direction of the translation in the level; `None` without one.
+    /// Direction of the horizontal translation, deg; `None` below `WAY_MIN_M`.
     direction_deg: Option<f64>,
 }
 
@@ -77,7 +78,7 @@ impl Change {
     }
 }
 
-/// The median of the earlier values, their robust spread and their largest deviation.
+/// The median of the earlier values, their robust standard deviation and their largest deviation.
 struct Usual {
     median: f64,
     spread: f64,
@@ -94,7 +95,7 @@ impl Usual {
         })
     }
 
-    /// How far a value deviates, where that is not usual.
+    /// The deviation of a value from the median; `None` if it is usual.
     fn outlier(&self, value: f64, least: f64) -> Option<f64> {
         let off = within_half_turn(value - self.median);
         (off.abs() > least.max(SPREADS * self.spread) && off.abs() > 2.0 * self.largest).then_some(off)
@@ -111,7 +112,7 @@ fn within_half_turn(deg: f64) -> f64 {
     (deg + 180.0).rem_euclid(360.0) - 180.0
 }
 
-/// The first jump after the last accepted update that puts the target outside the positions searched.
+/// Finds the first jump since the last accepted update that moves the target out of the searched positions.
 pub(super) fn find(book: &Book<'_>, rejected_before: usize) -> Option<Jump> {
     let step = book.trace.step;
     let is_corrected = book.trace.odometry.as_ref().is_some_and(|measured| measured.corrects);
@@ -129,12 +130,12 @@ pub(super) fn find(book: &Book<'_>, rejected_before: usize) -> Option<Jump> {
     })
 }
 
-/// Whether the estimate of this step changed as at the steps before it.
+/// Whether the pose change of this step is like those of the earlier steps.
 pub(super) fn is_usual(book: &Book<'_>) -> bool {
     book.trace.step < 1 || at_stop(book, book.trace.step).is_none()
 }
 
-/// What jumped at a stop, by how much, the largest usual deviation, and the change of pose without the jump.
+/// The jump at a stop: the quantity, its deviation, the largest usual deviation, and the pose change without the jump.
 fn at_stop(book: &Book<'_>, stop: usize) -> Option<(Jumped, f64, f64, Pose)> {
     let change = Change::to(book, stop);
     let earlier: Vec<Change> =
@@ -160,7 +161,7 @@ fn at_stop(book: &Book<'_>, stop: usize) -> Option<(Jumped, f64, f64, Pose)> {
     Some((Jumped::Position, aside_m(off), aside_m(usual_direction.largest.to_radians()), without))
 }
 
-/// Whether visual odometry, which did not correct the pose, saw the rover turn as the estimate says.
+/// Whether visual odometry, which did not correct the pose, confirms the estimated turn.
 fn is_turn_by_vision(book: &Book<'_>, stop: usize, by_deg: f64) -> bool {
     let measured = book.trace.odometry.as_deref().filter(|_| stop == book.trace.step);
     let motion = measured.and_then(|measured| measured.update.after_from_before);
@@ -171,8 +172,8 @@ fn is_turn_by_vision(book: &Book<'_>, stop: usize, by_deg: f64) -> bool {
     })
 }
 
-/// How far the prediction is from where it would be without the jump; `None` where that place was searched, or the inner `None`
-/// where it is out of the camera's view.
+/// The distance between the predictions with and without the jump, px. `None` if the latter was searched; the inner `None`
+/// if it is out of the camera's view.
 fn effect(book: &Book<'_>, stop: usize, without: &Pose) -> Option<Option<f64>> {
     let trace = book.trace;
     let (predicted, prediction) = (trace.point_mast.predicted_left?, trace.prediction()?);
@@ -184,7 +185,7 @@ fn effect(book: &Book<'_>, stop: usize, without: &Pose) -> Option<Option<f64>> {
         .then_some(Some(predicted.distance(pixel)))
 }
 
-/// Whether a pixel is none of the positions at which the template was compared; `None` where none was.
+/// Whether a pixel is outside the positions at which the template was compared; `None` if nothing was compared.
 pub(super) fn is_outside(trace: &RunStep, template_size_px: u32, pixel: Pixel) -> Option<bool> {
     let window = trace.template()?.match_template.as_ref()?.search_window;
     let half = f64::from(template_size_px / 2);

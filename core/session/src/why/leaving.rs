@@ -1,4 +1,4 @@
-//! A target that leaves an image: it is predicted so near to an edge, or beyond it, that the template does not fit there.
+//! A target that leaves an image: its prediction is too close to an edge for the template, or beyond the edge.
 
 use sightline_geometry::camera::Camera;
 use sightline_geometry::frames::Pixel;
@@ -7,19 +7,19 @@ use sightline_track::settings::TrackerKind;
 use super::Book;
 use super::words::number;
 
-/// The sentence for a target that leaves the left or the right image; `None` where both show all of it.
+/// The sentence for a target that leaves the left or the right image; `None` if the template fits into both.
 pub(super) fn sentence(book: &Book<'_>) -> Option<String> {
     let predicted = book.trace.prediction()?.position_in_rover;
     let pointing = &book.trace.point_mast;
     let template_px = match book.settings.tracker {
         TrackerKind::Template => f64::from(book.settings.template.template_size_px),
-        // Features anywhere in the image carry the target.
+        // These trackers use features or surface anywhere in the image.
         TrackerKind::Features | TrackerKind::Shape | TrackerKind::Combined => return None,
     };
     let seen = [("left", &pointing.left), ("right", &pointing.right)];
     seen.into_iter().find_map(|(side, camera)| {
         let pixel = match (side, pointing.predicted_left) {
-            // Also where a person displaced the prediction.
+            // Includes a displacement of the prediction by a person.
             ("left", Some(pixel)) => pixel,
             _ => camera.project(&predicted)?,
         };
@@ -41,7 +41,7 @@ pub(super) fn sentence(book: &Book<'_>) -> Option<String> {
     })
 }
 
-/// The edge of an image to which a pixel is nearest, and its distance from it, px; negative beyond it.
+/// The image edge nearest to a pixel, and the distance from it, px; negative beyond the edge.
 fn nearest_edge(camera: &Camera, pixel: Pixel) -> (&'static str, f64) {
     let [right, lower] = [camera.width(), camera.height()].map(|size| f64::from(size) - 1.0);
     let edges =

@@ -1,4 +1,4 @@
-//! The limits of the criteria; the tolerances of criteria 3 and 4 term by term (`stages/judge.rs`, R86, R87).
+//! The limits of the gates; the tolerances of criteria 3 and 4 term by term (`stages/judge.rs`, R86, R87).
 //!
 //! ```text
 //! tol_dist = g √( ΔR(D_old)² + ΔR(D_new)² + (f L_step)² )
@@ -11,7 +11,7 @@ use super::{Book, words};
 use sightline_track::stages::judge::Gate;
 
 impl Book<'_> {
-    /// The limit of a criterion.
+    /// The limit of a gate.
     pub(super) fn gate_limit(&self, name: &str) -> Option<Draft> {
         let gate = self.find_gate(name)?;
         let label = format!("limit of {name}");
@@ -119,7 +119,7 @@ impl Book<'_> {
         })
     }
 
-    /// Effective focal length at the prediction, as `judge` takes it, px.
+    /// Effective focal length at the prediction, as in `judge`, px.
     pub(super) fn focal_px(&self) -> Option<f64> {
         let left = &self.trace.point_mast.left;
         let at = self.predicted_left().unwrap_or_else(|| left.centre_pixel());
@@ -132,7 +132,7 @@ impl Book<'_> {
         Some((pointing.right.model.centre() - pointing.left.model.centre()).norm())
     }
 
-    /// Where a camera model comes from, in words.
+    /// The origin of a camera model, in words.
     pub(super) fn camera_name(&self, eye: usize) -> String {
         let word = ["left", "right"][eye.min(1)];
         let used = self.trace.point_mast.used;

@@ -1,22 +1,22 @@
-//! Why: any number of a step leads to where it came from.
+//! Explanations: the derivation of any value of a step.
 //!
 //! ```text
-//! value, unit ◄── formula ◄── inputs (each asked for in turn) ◄── stage ◄── file, pose, setting or click
+//! value, unit ◄── formula ◄── inputs (each explained in turn) ◄── stage ◄── file, pose, setting or click
 //! ```
-//! A tree is built from the step's record and the one before it; its values are those of the record, digit by digit. A
-//! node that says `is_closed_form` has a value that its formula gives from its inputs, to rounding (tests recompute them);
-//! of the others the formula says in words what the stage did, as the header of its module has it.
+//! A tree is built from the records of the step and the previous one; its values are exactly those of the records. If a node
+//! has `is_closed_form`, its formula gives its value from its inputs up to rounding (tests recompute them). Otherwise the
+//! formula describes the computation of the stage in words; the header of the stage's module has the details.
 //!
-//! | file | of what |
+//! | file | contents |
 //! |---|---|
-//! | `gates` | criteria, margins, the setting behind a limit |
-//! | `limits` | the limits, the tolerances of K§4.6 term by term |
+//! | `gates` | values and margins of gates |
+//! | `limits` | limits of gates, the tolerances of [Kim09 §4.6] term by term, settings |
 //! | `template` | the match and point stereo |
 //! | `prediction`, `position` | prediction, position, covariance |
 //! | `odometry` | the gates of visual odometry, and its part in a loss |
 //! | `truth` | errors against the truth |
-//! | `others` | features, shape, state, settings |
-//! | `recorded` | every other quantity, as its stage declares it |
+//! | `others` | features, shape, state, error budget |
+//! | `recorded` | all other quantities, as their stages declare them |
 //! | `sentence` | the summary of a step: headline and bullets, from the evidence |
 //! | `cause`, `jump` | the root cause of a loss, found without the truth |
 //! | `pose_change` | the change of the pose estimate at a step, with its σ |
@@ -59,16 +59,16 @@ use sightline_geometry::odometry_error::OdometryError;
 use sightline_track::settings::Settings;
 use sightline_track::stages::judge::Gate;
 
-/// How deep a tree goes; what lies deeper can be asked for by name.
+/// Maximum depth of a tree; deeper nodes can be requested by name.
 const DEPTH: usize = 12;
 
-/// Where a traverse has what its steps were computed from.
+/// Access to the data of a traverse from which its steps were computed.
 pub trait Sources {
     /// The estimated pose of a stop.
     fn site_from_rover(&self, step: usize) -> Pose;
     /// The error model of the pose estimates.
     fn pose_error(&self) -> OdometryError;
-    /// The name of the left (0) or right (1) image file of a stop, where it is known.
+    /// The name of the left (0) or right (1) image file of a stop; `None` if unknown.
     fn image_file(&self, step: usize, eye: usize) -> Option<String>;
 }
 
@@ -87,41 +87,41 @@ impl Sources for sightline_recordings::Traverse {
     }
 }
 
-/// The recorded steps and settings from which an explanation is made.
+/// The inputs of an explanation: recorded steps, settings and sources.
 #[derive(Clone, Copy)]
 pub struct Book<'a> {
     /// The step.
     pub trace: &'a RunStep,
-    /// The step before it; none at the designation.
+    /// The previous step; `None` at the designation.
     pub before: Option<&'a RunStep>,
     /// The run's configuration.
     pub settings: &'a Settings,
-    /// Where a person put the prediction of this step in the left image, px.
+    /// The prediction of this step in the left image as displaced by a person, px; `None`: by dead reckoning.
     pub prediction_px: Option<Pixel>,
-    /// Where the traverse has the rest.
+    /// The poses, error model and file names of the traverse.
     pub sources: &'a dyn Sources,
 }
 
-/// What is known of a step's verdict and of one of its values.
+/// The explanation of a step's verdict, and of one of its values.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Explanation {
     /// The step.
     pub step: usize,
     /// The root cause of a loss, then the verdict with its evidence, in sentences.
     pub sentence: String,
-    /// The criteria, worst margin first.
+    /// The gates, worst margin first.
     pub gates: Vec<Gate>,
-    /// The names that can be asked for at this step.
+    /// The names of the values that can be explained at this step.
     pub values: Vec<String>,
-    /// Where the value that was asked for came from; null where none was asked for.
+    /// The derivation of the requested value; null if none was requested.
     pub tree: Option<Node>,
 }
 
 impl<'a> Book<'a> {
-    /// What is known of the step, with the tree of one value.
+    /// Explains the step, and optionally one value.
     ///
     /// # Errors
-    /// [`Error::Request`] when the step has no such value.
+    /// [`Error::Request`] if the step has no such value.
     pub fn explain(&self, value: Option<&str>) -> Result<Explanation> {
         let tree = value.map(|value| self.ask(value)).transpose()?;
         let gates = self.trace.verdict().into_iter().flat_map(|verdict| gates::by_margin(&verdict.gates));
@@ -134,10 +134,10 @@ impl<'a> Book<'a> {
         })
     }
 
-    /// Where a value came from.
+    /// The derivation of a value.
     ///
     /// # Errors
-    /// [`Error::Request`] when the step has no such value.
+    /// [`Error::Request`] if the step has no such value.
     pub fn ask(&self, value: &str) -> Result<Node> {
         self.node(value, DEPTH).ok_or_else(|| {
             let step = self.trace.step;
@@ -147,7 +147,7 @@ impl<'a> Book<'a> {
         })
     }
 
-    /// The names that can be asked for: those that have a value at this step.
+    /// The names of the values that exist at this step and can be explained.
     pub fn names(&self) -> Vec<String> {
         let gates = self.trace.verdict().into_iter().flat_map(|verdict| &verdict.gates);
         let of_odometry = self.trace.odometry.iter().flat_map(|measured| &measured.update.gates);
@@ -165,7 +165,7 @@ impl<'a> Book<'a> {
             .collect()
     }
 
-    /// The node of a name, its inputs `depth` levels deep.
+    /// The node of a name, with `depth` levels of inputs.
     fn node(&self, name: &str, depth: usize) -> Option<Node> {
         let (group, rest) = name.split_once('.').unwrap_or(("", name));
         let draft = match group {
@@ -179,7 +179,7 @@ impl<'a> Book<'a> {
         Some(self.finish(name, draft, depth))
     }
 
-    /// A value that is explained in words of its own.
+    /// A value with its own explanation.
     fn of_name(&self, name: &str) -> Option<node::Draft> {
         self.of_template(name)
             .or_else(|| self.of_stereo(name))
@@ -189,7 +189,7 @@ impl<'a> Book<'a> {
             .or_else(|| self.of_others(name))
     }
 
-    /// A draft with its inputs.
+    /// Resolves the inputs of a draft, `depth` levels deep.
     fn finish(&self, name: &str, draft: node::Draft, depth: usize) -> Node {
         let inputs = match depth.checked_sub(1) {
             Some(less) => draft.inputs.iter().filter_map(|input| self.node(input, less)).collect(),
@@ -213,7 +213,7 @@ impl<'a> Book<'a> {
     }
 }
 
-/// The values that are explained in words of their own, beside those of the criteria; all others as declared.
+/// The values with their own explanation, in addition to those of gates; all others are explained as declared.
 const NAMES: [&str; 58] = [
     "state",
     "ncc",

@@ -1,50 +1,50 @@
-//! One line of a tree: a value with where it came from.
+//! A node of an explanation tree: a value with its formula, inputs and origin.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// A value with where it came from.
+/// A value with its formula, inputs and origin.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Node {
-    /// The name by which it can be asked for.
+    /// The name by which it can be requested.
     pub value: String,
-    /// The step at which it is to be asked for.
+    /// The step at which it can be requested.
     pub step: usize,
-    /// What it is, in words.
+    /// A description in words.
     pub label: String,
     /// Its numbers: one, or the coordinates of a pixel, point or pose, or a matrix row by row; null where not finite.
     pub numbers: Vec<Option<f64>>,
-    /// Its word, where it is no number.
+    /// Its word; null for numbers.
     pub text: Option<String>,
     /// Its unit, empty for pure numbers.
     pub unit: String,
-    /// How it follows from its inputs.
+    /// The formula that computes it from its inputs, or the computation in words; null without one.
     pub formula: Option<String>,
-    /// Whether the formula gives the value from the inputs to rounding.
+    /// Whether the formula gives the value from the inputs up to rounding.
     pub is_closed_form: bool,
-    /// The stage or step of `locate` that made it.
+    /// The stage or step of `locate` that computed it.
     pub stage: String,
-    /// Where it came from, where that is no other value.
+    /// Its origin outside the values of the step; null if there is none.
     pub origin: Option<Origin>,
-    /// Whether it has inputs that are left out here: ask for it.
+    /// Whether it has inputs that are left out here; request it by name to get them.
     pub has_more: bool,
-    /// What it was made of.
+    /// Its inputs.
     #[schema(no_recursion)]
     pub inputs: Vec<Node>,
 }
 
-/// What a value came from that is no other value of the step.
+/// The origin of a value outside the values of the step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Origin {
-    /// What it is.
+    /// The kind of origin.
     pub kind: OriginKind,
     /// Its name: a file, a stop, a setting.
     pub name: String,
-    /// The stop that it belongs to, where it belongs to one.
+    /// The stop to which it belongs; null if it belongs to none.
     pub step: Option<usize>,
 }
 
-/// The kinds of what a value may come from.
+/// The kinds of origins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum OriginKind {
@@ -56,15 +56,15 @@ pub enum OriginKind {
     Camera,
     /// A setting.
     Setting,
-    /// What a person did.
+    /// An action of a person.
     Person,
-    /// What the previous step left.
+    /// A result of an earlier step.
     Step,
     /// The truth of the traverse.
     Truth,
 }
 
-/// A node before its inputs were looked up.
+/// A node whose inputs are not yet resolved.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Draft {
     pub(super) label: String,
@@ -80,7 +80,7 @@ pub(super) struct Draft {
 }
 
 impl Draft {
-    /// Numbers of a stage.
+    /// A draft with numbers of a stage.
     pub(super) fn numbers(
         stage: &str,
         label: &str,
@@ -96,35 +96,35 @@ impl Draft {
         }
     }
 
-    /// One number of a stage.
+    /// A draft with one number of a stage.
     pub(super) fn number(stage: &str, label: &str, unit: &str, number: f64) -> Self {
         Self::numbers(stage, label, unit, [number])
     }
 
-    /// A word of a stage.
+    /// A draft with a word of a stage.
     pub(super) fn text(stage: &str, label: &str, text: impl Into<String>) -> Self {
         Self { text: Some(text.into()), ..Self::numbers(stage, label, "", []) }
     }
 
-    /// A formula that gives the value from the inputs.
+    /// Sets a formula that gives the value from the inputs up to rounding.
     pub(super) fn exactly(self, formula: &str, inputs: &[&str]) -> Self {
         Self { is_closed_form: true, ..self.roughly(formula, inputs) }
     }
 
-    /// What the stage did with the inputs, in words.
+    /// Sets a description of the computation from the inputs, in words.
     pub(super) fn roughly(mut self, formula: &str, inputs: &[&str]) -> Self {
         self.formula = Some(formula.to_owned());
         self.inputs = inputs.iter().map(|&input| input.to_owned()).collect();
         self
     }
 
-    /// Where the value came from.
+    /// Sets the origin of the value.
     pub(super) fn from(mut self, kind: OriginKind, name: impl Into<String>, step: Option<usize>) -> Self {
         self.origin = Some(Origin { kind, name: name.into(), step });
         self
     }
 
-    /// The step at which the value is to be asked for.
+    /// Sets the step at which the value can be requested.
     pub(super) fn at_step(mut self, step: usize) -> Self {
         self.step = Some(step);
         self

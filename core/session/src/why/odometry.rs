@@ -1,7 +1,6 @@
-//! Visual odometry in Why: its gates, and what it has to do with a target that is lost.
+//! Visual odometry in explanations: its gates, and its part in the loss of a target.
 //!
-//! The findings need no truth: they are made of the record of odometry, and where there is none of what the matches say
-//! about the pose.
+//! The findings need no truth. They use the record of odometry; without one, the evidence of the matches about the pose.
 
 use sightline_rover::visual_odometry::MeasuredMotion;
 use sightline_track::settings::Settings;
@@ -16,13 +15,13 @@ use super::words::{number, signed, told_apart};
 use crate::metrics::uncertainty::nis;
 use crate::step::RunStep;
 
-/// Its stage in the record.
+/// The name of its stage in the record.
 const STAGE: &str = "visual_odometry";
 
-/// A disagreement of so many standard deviations is none by chance.
+/// Minimum significant disagreement, standard deviations.
 const SIGMAS: f64 = 3.0;
 
-/// The number of the last criterion that scores a match; those after it are about the position.
+/// The number of the last criterion on match scores; the later ones are on the position.
 const LAST_SCORE: u8 = 2;
 
 /// The part of odometry in the loss of a target.
@@ -30,12 +29,11 @@ const LAST_SCORE: u8 = 2;
 pub(super) struct Finding {
     /// One sentence.
     pub(super) sentence: String,
-    /// Whether odometry refused its motion, so that the pose lacks a correction whatever the cause is.
+    /// Whether odometry refused its motion, so that the pose was not corrected.
     pub(super) is_refusal: bool,
 }
 
-/// What odometry has to do with the loss of the target; `None` where it is not lost, or where nothing says that the pose is
-/// to blame.
+/// The part of odometry in the loss of the target; `None` if it is not lost, or without evidence against the pose.
 pub(super) fn finding(trace: &RunStep, before: Option<&RunStep>, settings: &Settings) -> Option<Finding> {
     let verdict = trace.verdict().filter(|verdict| !verdict.good)?;
     let plain = |sentence| Finding { sentence, is_refusal: false };
@@ -53,12 +51,12 @@ pub(super) fn finding(trace: &RunStep, before: Option<&RunStep>, settings: &Sett
     }
 }
 
-/// That the motion by vision, which does not correct the pose, is significantly elsewhere; a sentence without its stop.
+/// The sentence, without full stop, for a pose that is not corrected by visual odometry and differs significantly from it.
 pub(super) fn disagreement(trace: &RunStep) -> Option<String> {
     not_used(trace.odometry.as_deref().filter(|measured| measured.update.accepted)?)
 }
 
-/// Why a motion is refused, as a clause with value and limit of its worst gate; `None` for an accepted one.
+/// Why a motion was refused, as a clause with value and limit of its worst gate; `None` for an accepted motion.
 pub(crate) fn refusal(measured: &MeasuredMotion) -> Option<String> {
     if measured.update.accepted {
         return None;
@@ -73,7 +71,7 @@ fn refused(reason: &str) -> String {
     format!("Visual odometry refused its update: {reason}; the pose is that of wheels and gyro.")
 }
 
-/// Value, limit and margin of a gate that has a value.
+/// Value, limit and margin of a gate; `None` without a value.
 fn gate_words(gate: &Gate) -> Option<String> {
     let [value, limit] = told_apart(gate.value?, gate.limit);
     let unit = if gate.unit.is_empty() { String::new() } else { format!(" {}", gate.unit) };
@@ -84,7 +82,7 @@ fn gate_words(gate: &Gate) -> Option<String> {
     ))
 }
 
-/// That an accepted motion does not correct the pose, where it is significantly elsewhere.
+/// The sentence for a motion that does not correct the pose and differs significantly from it; `None` otherwise.
 fn not_used(measured: &MeasuredMotion) -> Option<String> {
     let update = &measured.update;
     let (motion, covariance) = (update.after_from_before?, update.covariance?);
@@ -101,7 +99,8 @@ fn not_used(measured: &MeasuredMotion) -> Option<String> {
     })
 }
 
-/// What says that the pose is wrong: a good match at an impossible position, a peak at the rim, or the step before.
+/// Evidence that the pose is wrong: a good match beyond a position gate, a peak at the edge of the search window, or a
+/// significant innovation at the previous step.
 fn against_the_pose(
     trace: &RunStep,
     verdict: &Verdict,
@@ -168,7 +167,7 @@ impl Book<'_> {
         })
     }
 
-    /// The limit of a gate of odometry: its preset gives it, and the tracker has no such setting.
+    /// The limit of a gate of odometry: a setting of the odometry preset, not of the tracker.
     pub(super) fn odometry_limit(&self, gate: &Gate, draft: Draft) -> Option<Draft> {
         self.odometry_gate(&gate.name)?;
         let setting = gate.setting.as_deref().unwrap_or_default();

@@ -1,4 +1,4 @@
-//! The part that visual odometry has in a loss, told without the truth, and its gates as values that can be asked for.
+//! The part of visual odometry in a loss, found without the truth, and the explanations of its gates.
 
 use nalgebra::{Matrix6, Vector6};
 use serde_json::json;
@@ -12,7 +12,7 @@ use sightline_testing::PlaneWorld;
 use sightline_track::settings::Changes;
 use sightline_track::target::TrackingState;
 
-/// A motion of 60 cm by the wheels and 50 cm by vision whose translation has this 1σ, at most 1.5 cm is allowed.
+/// A motion of 60 cm by wheels and 50 cm by vision, with this 1σ of the translation; the gate allows 1.5 cm.
 fn measured(sigma_m: f64, corrects: bool) -> MeasuredMotion {
     let (limit, accepted) = (0.015, sigma_m <= 0.015);
     let gate = Gate {
@@ -69,7 +69,7 @@ fn measured(sigma_m: f64, corrects: bool) -> MeasuredMotion {
     }
 }
 
-/// A step at which the target is lost, with the one before it.
+/// A step at which the target is lost, with the previous step.
 fn lost() -> (PlaneWorld, [RunStep; 2], Settings) {
     let (world, mut steps, _) = run(&[]);
     let changes = Changes::from([("search_window_px".to_owned(), json!(41))]);
@@ -121,7 +121,7 @@ fn a_slip_check_says_that_the_pose_of_the_wheels_was_used() {
         words.contains("it puts the rover 0.100 m (12.50 σ) from the pose of wheels and gyro"),
         "{words}"
     );
-    // A motion that corrects the pose has no part in the loss.
+    // A motion that corrects the pose is not blamed for the loss.
     assert!(!told(Some(measured(0.01, true)), 0.0).contains("odometry"));
 }
 
@@ -132,7 +132,7 @@ fn without_odometry_what_the_matches_say_of_the_pose_is_told() {
     let of_before = words.contains("at step 1 the match was ");
     assert!(of_before || words.contains("at the rim of the search window: the rover may"), "{words}");
     let (_, [before, mut lost], settings) = lost();
-    // A peak in the middle of a wide window says nothing.
+    // A peak in the middle of a wide window is not evidence against the pose.
     let matched = lost.trace.located_mut().unwrap().evidence.template_mut().unwrap();
     let matched = matched.match_template.as_mut().unwrap();
     let [x, y] = matched.peak.integer;

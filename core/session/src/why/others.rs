@@ -1,4 +1,4 @@
-//! Features, shape, confidence, state and budget.
+//! Explanations of features, shape, confidence, state and error budget.
 
 use super::Book;
 use super::node::{Draft, OriginKind};
@@ -116,7 +116,7 @@ impl Book<'_> {
         }
     }
 
-    /// A number of a registration that is judged.
+    /// A value of a registration that a gate judges.
     pub(super) fn of_check(&self, name: &str) -> Option<Draft> {
         let found = self.trace.shape()?.registration.as_ref()?;
         let check = found.checks.iter().find(|check| check.name == name)?;

@@ -4,8 +4,8 @@
 //! before_from_after = site_from_rover(before)⁻¹ · site_from_rover(after)
 //! σ_t = √diag(R_d diag((f_along L)², (f_across L)², (f_across L)²) R_dᵀ)      σ_angle = σ_a    (as `predict`)
 //! ```
-//! Where visual odometry corrected the pose, σ is that of its covariance. Frame: the rover at the stop before, x ahead, y to the
-//! right, z down.
+//! If visual odometry corrected the pose, σ follows from its covariance. Frame: the rover at the previous stop, x ahead, y
+//! to the right, z down.
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use sightline_geometry::frames::Pose;
@@ -25,14 +25,14 @@ pub const AXES: [(&str, &str); 6] = [
 /// The change of a pose between two stops: translation in m, then roll, pitch and yaw in degrees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseChange {
-    /// The change.
+    /// The change, m and deg.
     pub change: [f64; 6],
-    /// 1σ of each component.
+    /// 1σ of each component, m and deg.
     pub sigma: [f64; 6],
 }
 
 impl PoseChange {
-    /// The change from the pose `before` to `after`, whose error is that of `measured` where that corrected it.
+    /// The change from the pose `before` to `after`; σ is from `measured` if that corrected the pose, else from `error`.
     pub fn between(
         before: &Pose,
         after: &Pose,
@@ -55,7 +55,7 @@ impl PoseChange {
     }
 }
 
-/// Translation in m, then roll, pitch and yaw in degrees.
+/// The components of a transform: translation in m, then roll, pitch and yaw in degrees.
 pub fn components(before_from_after: &Pose) -> [f64; 6] {
     let (roll, pitch, yaw) = before_from_after.rotation.euler_angles();
     joined(&before_from_after.translation.vector, &Vector3::new(roll, pitch, yaw).map(f64::to_degrees))

@@ -1,4 +1,4 @@
-//! Position and covariance, and the geometry that they come from.
+//! Explanations of position and covariance, and of the underlying geometry.
 
 use nalgebra::Matrix3;
 
@@ -45,12 +45,12 @@ impl Book<'_> {
         self.trace.located()?.position_in_rover
     }
 
-    /// Distance of what was located from the left camera, m.
+    /// Distance of the located position from the left camera, m.
     pub(super) fn range_located_m(&self) -> Option<f64> {
         Some((self.located()? - self.centre()).norm())
     }
 
-    /// A value of prediction, location or update.
+    /// A value of the prediction, location or update.
     pub(super) fn of_position(&self, name: &str) -> Option<Draft> {
         self.of_prediction(name)
             .or_else(|| self.of_projection(name))
@@ -62,7 +62,7 @@ impl Book<'_> {
             .or_else(|| self.of_covariance(name))
     }
 
-    /// The change of the estimated pose since the stop before.
+    /// The change of the estimated pose since the previous stop.
     fn pose_change(&self) -> Option<PoseChange> {
         let [before, now] =
             [self.before?.step, self.trace.step].map(|step| self.sources.site_from_rover(step));
@@ -201,7 +201,7 @@ impl Book<'_> {
         })
     }
 
-    /// How far what was located lies from what was expected.
+    /// The distances between located and expected position.
     fn of_correction(&self, name: &str) -> Option<Draft> {
         Some(match name {
             "distance_correction_m" => {
@@ -238,7 +238,7 @@ impl Book<'_> {
         })
     }
 
-    /// Whether what was located was taken.
+    /// Whether a position was located and accepted.
     fn is_found(&self) -> bool {
         self.trace.verdict().is_none_or(|verdict| verdict.accepted)
             && self.trace.located().is_some_and(|l| l.position_in_rover.is_some())

@@ -1,4 +1,4 @@
-//! The prediction (`stages/predict.rs`, `stages/point_mast.rs`).
+//! Explanations of the prediction (`stages/predict.rs`, `stages/point_mast.rs`).
 
 use super::Book;
 use super::node::{Draft, OriginKind};

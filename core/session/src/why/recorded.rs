@@ -1,4 +1,4 @@
-//! Quantities that the stages declare: value, unit, formula and inputs as declared, unless another file has words for one.
+//! Explanations of declared quantities: value, unit, formula and inputs as declared, unless another file explains them.
 
 use crate::records::{self, StageQuantity};
 use sightline_record::{StageSchema, Value};
@@ -7,7 +7,7 @@ use super::Book;
 use super::node::{Draft, OriginKind};
 
 impl Book<'_> {
-    /// A field of a stage: in words of its own where there are some, else as declared.
+    /// A field of a stage, by its own explanation if there is one, else as declared.
     pub(super) fn of_quantity(&self, stage: &str, field: &str) -> Option<Draft> {
         let name = format!("{stage}.{field}");
         let declared = self.of_record(stage, field);
@@ -16,7 +16,7 @@ impl Book<'_> {
         own.or(declared)
     }
 
-    /// A quantity of a stage as it is declared.
+    /// A quantity of a stage as declared.
     pub(super) fn of_record(&self, stage: &str, name: &str) -> Option<Draft> {
         let stage = records::stage(stage).filter(|stage| stage.is_reached(self.trace))?;
         let (schema, quantity) = (stage.schema(), stage.schema().quantity(name)?);
@@ -38,7 +38,7 @@ impl Book<'_> {
         Some(draft.roughly(&quantity.formula, &inputs))
     }
 
-    /// What a stage computes its quantities from.
+    /// Adds the origin of the quantities of a stage.
     pub(super) fn origin_of(&self, stage: &str, draft: Draft) -> Draft {
         let step = self.trace.step;
         match stage {
@@ -58,23 +58,23 @@ impl Book<'_> {
     }
 }
 
-/// The columns of a row.
+/// The names of the columns of a row.
 pub(super) fn columns() -> impl Iterator<Item = &'static str> {
     let row = records::stage("step").into_iter().flat_map(|stage| &stage.schema().quantities);
     row.map(|quantity| quantity.name.as_ref())
 }
 
-/// Whether a field of a stage can be asked about: a quantity, or a field with an explanation of its own.
+/// Whether a field of a stage can be explained: a quantity, or a field with its own explanation.
 pub fn is_explained(field: &str) -> bool {
     own_words(field).is_some() || StageQuantity::named(field).is_some()
 }
 
-/// The name under which the value of a field is explained in words of its own.
+/// The name of a field's own explanation; `None` without one.
 pub(super) fn own_words(field: &str) -> Option<&'static str> {
     OWN_WORDS.iter().find(|(own, _)| *own == field).map(|(_, name)| *name)
 }
 
-/// Fields of stages, each with the name under which its value is explained in words of its own.
+/// The fields with their own explanation, and the name of that explanation.
 const OWN_WORDS: [(&str, &str); 47] = [
     ("predict.position_in_rover", "predicted_position"),
     ("predict.covariance_in_rover", "predicted_covariance_m2"),

@@ -1,4 +1,4 @@
-//! The cause of the first loss in drives of the library, each with a known trouble.
+//! The cause of the first loss in drives of the scenario library, each with a known trouble.
 
 use serde_json::{Value, json};
 
@@ -9,8 +9,8 @@ use sightline_track::settings::Changes;
 use sightline_track::target::Designation;
 use sightline_world::{choose_targets, library};
 
-/// The first rejected step of a drive and its summary without the truth; `None` where all steps up to `last` are accepted. The
-/// settings of step `last` are changed.
+/// The first rejected step of a drive and its summary without the truth; `None` if all steps up to `last` are accepted. The
+/// changed settings apply at step `last`.
 fn first_loss(name: &str, last: usize, changes: &[(&str, Value)]) -> Option<(usize, sentence::Summary)> {
     let mut scenario = library::scenario(name).unwrap();
     (scenario.camera.image_size, scenario.camera.samples_per_axis) = (512, 1);

@@ -1,9 +1,9 @@
-//! The summary of a step: a headline with the root cause, and at most three bullets, made of its evidence.
+//! The summary of a step: a headline with the root cause, and at most three bullets with evidence.
 //!
 //! | step | headline | bullets |
 //! |---|---|---|
 //! | rejected | the cause, found without the truth (`cause`) | failed gates; peak and prediction; truth and odometry |
-//! | accepted | the gate with the smallest margin | false tracking, where the truth says so |
+//! | accepted | the gate with the smallest margin | false tracking, if the truth shows it |
 //! | others | why nothing is judged | none |
 
 use super::gates::{by_margin, label};
@@ -19,13 +19,13 @@ use sightline_track::target::TrackingState;
 use sightline_vision::image::PixelRect;
 use sightline_world::target_truth::TruthKind;
 
-/// A peak so near to the rim may belong to one beyond it, px.
+/// Maximum distance from the edge of the search window at which the true peak may be beyond it, px.
 pub(super) const AT_RIM_PX: f64 = 3.0;
 
-/// A second peak of such a share of the best may as well be the right one.
+/// Minimum ratio of second to best peak at which either may be the right one.
 const AMBIGUOUS: f64 = 0.95;
 
-/// What came of a step and why, in sentences.
+/// The outcome of a step and its cause, in sentences.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Summary {
     /// The root cause of a loss, else the verdict.
@@ -83,7 +83,7 @@ impl Book<'_> {
         context.extend(cause.as_ref().and_then(|cause| cause.evidence.clone()));
         context.extend(lost_before(verdict, self.before));
         let context = (!context.is_empty()).then(|| format!("{}.", capitalised(&context.join("; "))));
-        // Odometry has no part in a loss whose cause is known to be another.
+        // Odometry is omitted if another cause is known.
         let is_open = cause.as_ref().is_none_or(|cause| cause.is_slip);
         let odometry = odometry::finding(trace, self.before, self.settings).filter(|finding| {
             (is_open || finding.is_refusal) && Some(&finding.sentence) != cause.as_ref().map(|c| &c.sentence)
@@ -96,7 +96,7 @@ impl Book<'_> {
     }
 }
 
-/// What was decided, with the criteria that decided it.
+/// The decision, with the gates that caused it.
 fn decision(verdict: &Verdict, trace: &RunStep) -> String {
     let margins = by_margin(&verdict.gates);
     let failed: Vec<String> = margins
@@ -136,7 +136,7 @@ fn failed_words(gate: &Gate) -> String {
     )
 }
 
-/// What is odd about the peak.
+/// Anomalies of the peak.
 fn peak_words(trace: &RunStep, settings: &Settings, accepted: bool) -> Vec<String> {
     let located = trace.located().map(|located| &located.evidence);
     let Some(Evidence::Template(evidence)) = located else { return Vec::new() };
@@ -162,7 +162,7 @@ fn peak_words(trace: &RunStep, settings: &Settings, accepted: bool) -> Vec<Strin
     words
 }
 
-/// How far off the prediction was, by the truth where that is known, else by the match.
+/// The error of the prediction, relative to the truth if known, else to the match.
 fn prediction_words(trace: &RunStep, settings: &Settings, accepted: bool) -> Option<String> {
     let predicted = trace.point_mast.predicted_left.filter(|_| !accepted && trace.prediction().is_some())?;
     let template = trace.located().and_then(|located| match &located.evidence {
@@ -191,7 +191,7 @@ fn is_cut(trace: &RunStep, window: PixelRect) -> bool {
         || end(window.y, window.height) >= i64::from(height)
 }
 
-/// That it was lost before already.
+/// The clause for a target that was already lost or failed.
 fn lost_before(verdict: &Verdict, before: Option<&RunStep>) -> Option<String> {
     match (verdict.state_before, verdict.good) {
         (TrackingState::Lost { count: 1 }, false) => Some("the update before was bad, too".to_owned()),
@@ -205,7 +205,7 @@ fn lost_before(verdict: &Verdict, before: Option<&RunStep>) -> Option<String> {
     }
 }
 
-/// What the truth says of the decision.
+/// The correctness of the decision by the truth.
 fn truth_words(trace: &RunStep, verdict: &Verdict) -> Option<String> {
     let truth = trace.truth.as_ref()?;
     let (err_px, tolerance_px) = (truth.err_px?, truth.tolerance_px);
@@ -216,7 +216,7 @@ fn truth_words(trace: &RunStep, verdict: &Verdict) -> Option<String> {
     };
     match (verdict.accepted, err_px <= tolerance_px) {
         (true, false) => {
-            // An error of the designation itself is carried along.
+            // An error of the designation itself is propagated.
             let claim = match truth.kind {
                 TruthKind::Surface => "FALSE tracking",
                 TruthKind::Carried => "FALSE tracking, or an inaccurate first estimate",

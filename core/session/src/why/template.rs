@@ -1,4 +1,4 @@
-//! The template's match and point stereo (`locate/template`).
+//! Explanations of template match and point stereo (`locate/template`).
 
 use super::Book;
 use super::node::{Draft, OriginKind};
@@ -21,7 +21,7 @@ impl<'a> Book<'a> {
         self.template()?.match_template.as_ref()
     }
 
-    /// From the image files of this step, in words.
+    /// The name of an image file, or a description if it is unknown.
     fn image_name(&self, step: usize, eye: usize) -> String {
         let word = ["left", "right"][eye.min(1)];
         self.sources.image_file(step, eye).unwrap_or_else(|| format!("{word} image of stop {step}"))
@@ -261,8 +261,8 @@ impl<'a> Book<'a> {
     }
 }
 
-/// From the best whole pixel to the rim of the positions compared, px: as `TemplateMatch::edge_distance_px`, from the
-/// numbers of the record alone.
+/// Distance from the best whole pixel to the edge of the compared positions, px: as `TemplateMatch::edge_distance_px`, from
+/// the recorded numbers alone.
 pub(super) fn edge_distance_px(matched: &TemplateMatch, template_size_px: u32) -> f64 {
     let (window, half) = (matched.search_window, (template_size_px / 2) as i32);
     let along = |peak: i32, start: i32, length: u32| {

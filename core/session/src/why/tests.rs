@@ -1,4 +1,4 @@
-//! Every value of a tree is that of the record, and every closed form gives it from the inputs that the tree shows.
+//! Every value of a tree equals that of the record, and every closed form reproduces it from the inputs in the tree.
 
 use nalgebra::{Matrix2, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector2};
 use serde_json::json;
@@ -29,7 +29,7 @@ impl Sources for PlaneWorld {
 fn world() -> PlaneWorld {
     let mut world =
         PlaneWorld::new([0.0, 0.6, 1.2, 1.8, 2.4].map(|x| Pose::translation(x, 0.0, 0.0)).to_vec());
-    // The estimate jumps once, and one stop sees nothing.
+    // The estimate jumps once, and the cameras are covered at one stop.
     world.estimates[2].translation.vector += Vector3::new(0.01, 0.3, 0.0);
     world.troubles[3] = Trouble::Covered;
     world
@@ -57,7 +57,7 @@ pub(super) fn numbers(node: &Node) -> Vec<f64> {
     node.numbers.iter().map(|number| number.unwrap_or(f64::NAN)).collect()
 }
 
-/// The inputs of a node by name.
+/// Access to the inputs of a node by name.
 struct Inputs<'a>(&'a Node);
 
 impl Inputs<'_> {
@@ -93,9 +93,9 @@ fn largest_sigma(covariance: &[f64]) -> f64 {
     }
 }
 
-/// The value of a closed form by what its formula says, from the inputs alone; none for a name without a recomputation.
+/// The value of a closed form, recomputed from the inputs alone; `None` for a name without a recomputation.
 fn recomputed(node: &Node) -> Option<Vec<f64>> {
-    // What a criterion judges is the same number under its own name.
+    // The value of a gate is also available under its own name.
     let name = node.value.strip_prefix("value.").unwrap_or(&node.value);
     let name = recorded::own_words(name).unwrap_or(name);
     limits(node, name).or_else(|| places(node, name)).or_else(|| errors(node, name)).or_else(|| {
@@ -204,7 +204,7 @@ fn errors(node: &Node, name: &str) -> Option<Vec<f64>> {
     }])
 }
 
-/// Checks a tree; counts the closed forms that were recomputed.
+/// Checks a tree, and counts the recomputed closed forms.
 pub(super) fn check(node: &Node, count: &mut usize) {
     node.inputs.iter().for_each(|input| check(input, count));
     if !node.is_closed_form || node.has_more {

@@ -1,4 +1,4 @@
-//! What the truth says of a step (`study/truth.rs`).
+//! Explanations of the comparison with the truth (`sightline_world::target_truth`).
 
 use super::Book;
 use super::node::{Draft, OriginKind};

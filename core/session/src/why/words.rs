@@ -1,4 +1,4 @@
-//! Words of explanations: numbers by the rule of [`crate::format`], and the display names of settings.
+//! Text of explanations: numbers by the rule of [`crate::format`], and the display names of settings.
 
 use sightline_record::{Unit, label};
 use sightline_track::locate::gate_kinds;
@@ -11,12 +11,12 @@ pub fn number(value: f64) -> String {
     if value.is_finite() { format::number(value) } else { "none".to_owned() }
 }
 
-/// The same with its sign.
+/// A number with its sign, by the common rule.
 pub fn signed(value: f64) -> String {
     if value > 0.0 { format!("+{}", number(value)) } else { number(value) }
 }
 
-/// Two numbers with as many digits as it takes to see that they differ.
+/// Two numbers with as many digits as are needed to distinguish them.
 pub fn told_apart(a: f64, b: f64) -> [String; 2] {
     if a.is_finite() && b.is_finite() { format::distinct(a, b) } else { [number(a), number(b)] }
 }
@@ -27,7 +27,7 @@ pub fn capitalised(words: &str) -> String {
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
-/// The display name of a setting: that of its gate where it is the limit of one alone, else its key in words.
+/// The display name of a setting: from its gate if it is the limit of exactly one, else its key in words.
 pub fn setting_name(key: &str) -> String {
     let mut own = gate_kinds().into_iter().filter(|kind| kind.setting == Some(key));
     match (own.next(), own.next()) {

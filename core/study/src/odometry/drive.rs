@@ -1,4 +1,5 @@
-//! One drive of the study: at every stop a pair, the motion since the stop before, and the truth beside it.
+//! One drive of the study: a stereo pair at every stop, the motion since the previous stop, and its comparison with the
+//! truth.
 
 use std::path::Path;
 
@@ -21,15 +22,15 @@ use sightline_world::{Scenario, World};
 use super::row::{OVERLAP_MIN, OdometryRow, OdometryStep};
 use super::{Commanded, OdometryDrives, TRACKS_BEFORE};
 
-/// Points along each side of the image by which the overlap is measured.
+/// Points along each side of the image at which the overlap is sampled.
 const OVERLAP_SIDE: u32 = 8;
 
-/// A drive under way.
+/// A drive in progress.
 pub(super) struct OdometryDrive<'a> {
     study: &'a OdometryDrives<'a>,
     world: DrivenTraverse,
     pair: StereoPair,
-    /// Azimuth at which the last pair looks, as it was asked for, rad.
+    /// Azimuth of the last pair as commanded by the predicted motion, without the half turn of a backward view, rad.
     azimuth_rad: f64,
     estimated: Pose,
     way_m: f64,
@@ -59,7 +60,7 @@ impl<'a> OdometryDrive<'a> {
         Ok(drive)
     }
 
-    /// Drives some metres straight on, so that the view back shows tracks, and takes the first pair there.
+    /// Drives some metres straight ahead, so that the backward view shows tracks, and captures the first pair there.
     pub(super) fn lay_tracks(&mut self, cancel: Cancel<'_>) -> Result<()> {
         for _ in 0..TRACKS_BEFORE {
             self.world.drive(&Motion::Arc { length_m: 1.0, curvature_per_m: 0.0 }, cancel)?;
@@ -71,7 +72,7 @@ impl<'a> OdometryDrive<'a> {
         Ok(())
     }
 
-    /// Points the mast for the last stop.
+    /// Points the mast at the last stop.
     fn look(&mut self, before: Option<f64>, predicted: &Pose) -> Result<()> {
         let mast = self.world.traverse().mast().cloned();
         let mut angles = mast.and_then(|mast| look(&mast, before, predicted));
@@ -84,7 +85,7 @@ impl<'a> OdometryDrive<'a> {
         self.world.point_mast(angles)
     }
 
-    /// Drives, looks and measures; whether a rock stopped the wheels.
+    /// Drives, captures and measures a step; returns whether a rock stalled the wheels.
     pub(super) fn step(&mut self, commanded: Commanded, cancel: Cancel<'_>) -> Result<bool> {
         let Commanded { length_m, turn_rad } = commanded;
         let motion = if length_m != 0.0 {
@@ -135,7 +136,7 @@ impl<'a> OdometryDrive<'a> {
         pose.ok_or_else(|| Error::Request(format!("stop {stop} has no true pose")))
     }
 
-    /// The update beside the true motion.
+    /// Compares an update with the true motion.
     fn compared(
         &mut self,
         stop: usize,
@@ -190,7 +191,7 @@ impl<'a> OdometryDrive<'a> {
         })
     }
 
-    /// Share of the ground in the left image before that is in the left image after, by the true poses.
+    /// Fraction of the ground in the left image before that is in the left image after, by the true poses.
     fn overlap(&self, stop: usize, before: &Pose, after: &Pose) -> f64 {
         let stops = self.world.traverse();
         let Some(world) = stops.world() else { return 0.0 };
@@ -239,12 +240,12 @@ impl<'a> OdometryDrive<'a> {
     }
 }
 
-/// Whether a point is not hidden from a camera; both in the site frame.
+/// Returns whether a point is not occluded for a camera; both in the site frame.
 fn is_visible(world: &World, camera: &Camera, point: &Point3) -> bool {
     world.is_visible(&camera.model.centre(), point)
 }
 
-/// Mahalanobis distance of a vector; none where the covariance has no inverse.
+/// Mahalanobis distance of a vector; `None` if the covariance is not positive definite.
 fn distance(covariance: &Matrix3<f64>, vector: &Vector3<f64>) -> Option<f64> {
     covariance.cholesky().map(|factor| vector.dot(&factor.solve(vector)).max(0.0).sqrt())
 }

@@ -1,15 +1,15 @@
-//! Visual odometry in simulated drives: how often it converges, how often it is silently wrong, and how it drifts.
+//! Visual odometry in simulated drives: rates of convergence and of silent errors, and drift.
 //!
-//! A drive has no target. At every stop the mast looks at the ground ahead, one pair is taken, and the motion since the stop
-//! before is measured and compared with the true one:
+//! A drive has no target. At every stop the mast points at the ground ahead, one pair is captured, and the motion since
+//! the previous stop is measured and compared with the true one:
 //!
 //! ```text
 //! error of an update   δ:  T_true = exp(δ) T        NEES per dof = δᵀ Σ⁻¹ δ / 6
 //! silently wrong       accepted, while √(τᵀ Σ_τ⁻¹ τ) > 5 and |τ| > max(1 cm, 4 % of the step),
-//!                      or the turn's error > 0.2° and > 5 σ
-//! drift                distance of the last estimated position from the true one, % of the true way
+//!                      or the rotation error > 0.2° and > 5 σ
+//! drift                distance of the last estimated position from the true one, % of the true path length
 //! ```
-//! Steps that are refused are taken from wheels and gyro. Frames: rover frame after, site. Source: design.md, domain.md 9.
+//! Rejected steps use wheels and gyro. Frames: rover frame after, site. Source: design.md, domain.md 9.
 
 mod drive;
 mod row;
@@ -31,20 +31,20 @@ use sightline_world::{Scenario, library};
 
 use self::drive::OdometryDrive;
 
-/// Metres that are driven before the first update where the mast looks back at tracks.
+/// Metres driven before the first update if the mast points back at the tracks.
 const TRACKS_BEFORE: usize = 4;
 
 /// The ground of the drives of a study.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Scene {
-    /// Soil with rocks and texture; every step has a slip of 0 to 125 % that is drawn.
+    /// Soil with rocks and texture; the slip of every step is drawn from 0 to 125 %.
     Textured,
-    /// The same with the slip of soil and slope: the drives whose drift counts.
+    /// As `Textured`, with the slip of soil and slope: the drives by which drift is measured.
     Slope,
-    /// Smooth ground on which the rover looks back at its own tracks.
+    /// Smooth ground on which the rover views its own tracks behind it.
     OwnTracks,
-    /// The same, straight on and without any texture of the ground: tracks that repeat themselves.
+    /// As `OwnTracks`, but straight and without ground texture: periodic tracks.
     PicketFence,
     /// Ground without texture.
     Featureless,
@@ -55,7 +55,7 @@ impl Scene {
     pub const ALL: [Self; 5] =
         [Self::Textured, Self::Slope, Self::OwnTracks, Self::PicketFence, Self::Featureless];
 
-    /// The name in rows and on the command line.
+    /// Name in rows and on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Textured => "textured",
@@ -66,7 +66,7 @@ impl Scene {
         }
     }
 
-    /// Whether the mast looks back.
+    /// Returns whether the mast points backwards.
     fn looks_back(self) -> bool {
         matches!(self, Self::OwnTracks | Self::PicketFence)
     }
@@ -81,7 +81,7 @@ pub struct OdometryDrives<'a> {
     pub settings: &'a OdometrySettings,
     /// The ground.
     pub scene: Scene,
-    /// Steps of a drive.
+    /// Number of steps of a drive.
     pub steps: usize,
     /// Side of the images, px.
     pub size: u32,
@@ -89,7 +89,7 @@ pub struct OdometryDrives<'a> {
     pub samples_per_axis: u32,
 }
 
-/// A step as it is commanded.
+/// A commanded step.
 #[derive(Clone, Copy, Debug)]
 struct Commanded {
     length_m: f64,
@@ -97,8 +97,8 @@ struct Commanded {
 }
 
 impl Commanded {
-    /// Away from the rock that stopped this step, last command first: back where the rover came from, and a turn of 36° to one
-    /// side, which an odd number makes the left.
+    /// Commands that lead away from the rock that stalled this step, last command first: back along the path, and a turn
+    /// of 36°, to the left if `side` is odd.
     fn escape(self, side: u64) -> Vec<Self> {
         let side = if side.is_multiple_of(2) { 1.0 } else { -1.0 };
         let turn = Self { length_m: 0.0, turn_rad: side * 18f64.to_radians() };
@@ -108,17 +108,17 @@ impl Commanded {
 }
 
 impl OdometryDrives<'_> {
-    /// The scenario of a world; the seed draws slope, sun and slips as well.
+    /// Scenario of a world; the seed also draws slope, sun and slips.
     ///
     /// # Errors
-    /// The library's scenario, or one that no world can be made of.
+    /// An error of the library's scenario, or a scenario for which no world can be generated.
     pub fn scenario(&self, seed: u64) -> Result<Scenario> {
         let mut random = Pcg64::seed_from_u64(seed ^ 0x0d0e_7291);
         let mut scenario = Scenario { seed, ..library::scenario("approach-10")? };
         scenario.terrain.slope_deg = random.random_range(0.0..31.0);
         scenario.terrain.slope_azimuth_deg = random.random_range(-180.0..180.0);
         scenario.sun.azimuth_deg = random.random_range(0.0..360.0);
-        // Higher than the slope is steep, so that the ground is lit.
+        // Above the steepest slope, so that the ground is lit.
         scenario.sun.elevation_deg = random.random_range(35.0..70.0);
         (scenario.camera.image_size, scenario.camera.samples_per_axis) = (self.size, self.samples_per_axis);
         scenario.rover.odometry = OdometryModel::WheelsAndImu;
@@ -141,14 +141,14 @@ impl OdometryDrives<'_> {
         Ok(scenario)
     }
 
-    /// The steps of a drive.
+    /// Commanded steps of a drive.
     fn commanded(&self, seed: u64) -> Vec<Commanded> {
         let mut random = Pcg64::seed_from_u64(seed ^ 0x57e9_57e9);
         let mut heading_rad = 0.0f64;
         let step = |_| {
             let length_m = random.random_range(0.25..0.75);
             let turn_deg: f64 = random.random_range(-18.0..18.0);
-            // The drive keeps near its first direction.
+            // Limits the deviation from the first heading.
             let turn_rad = match self.scene {
                 Scene::PicketFence => 0.0,
                 _ if heading_rad.abs() > 0.7 => -heading_rad.signum() * turn_deg.abs().to_radians(),
@@ -160,10 +160,10 @@ impl OdometryDrives<'_> {
         (0..self.steps).map(step).collect()
     }
 
-    /// The drives of some worlds, several at a time, in the order of their seeds; `tell` is called after each.
+    /// Runs the drives of some worlds in parallel; rows are in the order of the seeds. `tell` is called after each.
     ///
     /// # Errors
-    /// A world that cannot be made, or [`Error::Cancelled`].
+    /// A world that cannot be generated, or [`Error::Cancelled`].
     pub fn run(
         &self,
         seeds: &[u64],
@@ -179,14 +179,14 @@ impl OdometryDrives<'_> {
         seeds.par_iter().map(one).collect()
     }
 
-    /// One drive in a folder that is removed afterwards; it ends early where the rover cannot go on.
+    /// Runs one drive in a folder that is removed afterwards; it ends early if the rover cannot continue.
     ///
     /// # Errors
-    /// A world that cannot be made, or [`Error::Cancelled`].
+    /// A world that cannot be generated, or [`Error::Cancelled`].
     pub fn drive(&self, seed: u64, folder: &Path, cancel: Cancel<'_>) -> Result<OdometryRow> {
         let scenario = self.scenario(seed)?;
         let outcome = self.driven(&scenario, seed, folder, cancel);
-        // A failure to remove leaves a folder in the way of nobody.
+        // A folder that cannot be removed does no harm.
         let _ = std::fs::remove_dir_all(folder);
         outcome
     }
@@ -222,7 +222,7 @@ impl OdometryDrives<'_> {
     }
 }
 
-/// Takes the texture from the ground.
+/// Reduces the texture of the ground.
 fn smooth(scenario: &mut Scenario, scene: Scene) {
     (scenario.rocks.area_fraction, scenario.rocks.cluster_count) = (0.0, 0);
     scenario.terrain.rms_at_1m_m = 0.005;

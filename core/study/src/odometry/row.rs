@@ -1,4 +1,4 @@
-//! The rows of the study: a drive, its updates, and the drives of one ground together.
+//! Rows of the study: a drive, its updates, and the summary of the drives of one scene.
 
 use std::collections::BTreeMap;
 
@@ -8,73 +8,73 @@ use sightline_geometry::estimate::quantile::quantile;
 
 use super::Scene;
 
-/// Share of the view before that must be in view again for an update to count, 0 to 1.
+/// Least fraction of the previous view that must be visible again for an update to count, 0 to 1.
 pub(super) const OVERLAP_MIN: f64 = 0.6;
 
-/// One drive.
+/// Row of one drive.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OdometryRow {
     /// Name of the settings.
     pub configuration: String,
-    /// The world's seed.
+    /// Seed of the world.
     pub seed: u64,
-    /// The ground.
+    /// Ground of the drive.
     pub scene: Scene,
     /// Slope of the ground, deg.
     pub slope_deg: f64,
     /// Mean slip along the motion.
     pub slip: f64,
-    /// Updates whose views overlap by 60 % or more.
+    /// Number of updates with views that overlap by 60 % or more.
     pub updates: usize,
-    /// Those that were accepted.
+    /// Number of accepted ones.
     pub converged: usize,
-    /// Those that were refused.
+    /// Number of rejected ones.
     pub refused: usize,
-    /// Accepted ones that are wrong beyond their covariance, with little overlap too.
+    /// Number of accepted updates that are wrong beyond their covariance, at any overlap.
     pub silently_wrong: usize,
-    /// True way of the rover, m.
+    /// True path length of the rover, m.
     pub distance_m: f64,
-    /// Distance of the estimated end from the true one, % of the true way.
+    /// Distance between the estimated and the true end, % of the true path length.
     pub drift_percent: f64,
     /// 95th percentile of the error of the slip, percentage points; null without an accepted update.
     pub slip_error_points: Option<f64>,
     /// Mean NEES per degree of freedom of the accepted updates; null without one.
     pub nees_per_dof: Option<f64>,
-    /// Why the drive ended before its last step; null where it did not.
+    /// Reason why the drive ended early; null if it did not.
     pub problem: Option<String>,
-    /// The updates, one by one.
+    /// All updates.
     #[serde(skip)]
     pub steps: Vec<OdometryStep>,
 }
 
-/// The drives of one ground and one set of settings together.
+/// Summary of the drives with one scene and configuration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OdometrySummary {
     /// Name of the settings.
     pub configuration: String,
-    /// The ground.
+    /// Ground of the drives.
     pub scene: Scene,
-    /// Drives.
+    /// Number of drives.
     pub drives: usize,
-    /// Updates whose views overlap by 60 % or more.
+    /// Number of updates with views that overlap by 60 % or more.
     pub updates: usize,
-    /// Accepted ones of them, %.
+    /// Percentage of accepted updates among them.
     pub converged_percent: f64,
-    /// Accepted updates that are wrong beyond their covariance.
+    /// Number of accepted updates that are wrong beyond their covariance.
     pub silently_wrong: usize,
-    /// Bound of their share with 95 % confidence where there is none, %: 3/n; null where there is one.
+    /// Upper bound of their percentage with 95 % confidence, 3/n, if there is none; null otherwise.
     pub silently_wrong_below_percent: Option<f64>,
-    /// Median and 95th percentile of the drift, % of the way.
+    /// Median and 95th percentile of the drift, % of the path length.
     pub drift_percent: [f64; 2],
     /// 95th percentile of the error of the slip, percentage points; null without an accepted update.
     pub slip_error_points: Option<f64>,
     /// Mean NEES per degree of freedom over drives, and its standard deviation; null without an accepted update.
     pub nees_per_dof: Option<[f64; 2]>,
-    /// Updates refused, by the beginning of their sentence.
+    /// Number of rejected updates, by the beginning of their message.
     pub refusals: BTreeMap<String, usize>,
 }
 
-/// Sums up the drives of one ground and one set of settings; `None` without any.
+/// Summarises the drives of one scene and configuration; `None` without any.
 pub fn summary(rows: &[OdometryRow]) -> Option<OdometrySummary> {
     let first = rows.first()?;
     let steps = || rows.iter().flat_map(|row| &row.steps);
@@ -113,25 +113,25 @@ pub fn summary(rows: &[OdometryRow]) -> Option<OdometrySummary> {
 /// One update compared with the truth.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OdometryStep {
-    /// The stop after.
+    /// Index of the stop after the motion.
     pub stop: usize,
     /// Length of the commanded path, m.
     pub commanded_m: f64,
-    /// Commanded turn, deg.
+    /// Commanded rotation, deg.
     pub turn_deg: f64,
     /// True slip along the motion of the wheels.
     pub slip: f64,
-    /// Share of the view before that is in view again.
+    /// Fraction of the previous view that is visible again.
     pub overlap: f64,
     /// Whether the update was accepted.
     pub accepted: bool,
-    /// Why not, as one sentence.
+    /// Reason of the rejection, as one sentence.
     pub refusal: Option<String>,
-    /// Whether it is wrong beyond its covariance although it was accepted.
+    /// Whether it was accepted although it is wrong beyond its covariance.
     pub silently_wrong: bool,
-    /// Error of the translation, m, and of the turn, deg; null without a motion.
+    /// Error of the translation, m; null without a motion.
     pub error_m: Option<f64>,
-    /// Error of the turn, deg.
+    /// Error of the rotation, deg; null without a motion.
     pub error_deg: Option<f64>,
     /// Mahalanobis distance of the translation.
     pub distance: Option<f64>,
@@ -139,14 +139,14 @@ pub struct OdometryStep {
     pub nees_per_dof: Option<f64>,
     /// Error of the slip, percentage points.
     pub slip_error_points: Option<f64>,
-    /// Matches that agree with the motion.
+    /// Number of matches consistent with the motion.
     pub inliers: usize,
     /// χ² per degree of freedom of the residuals.
     pub chi2_per_dof: Option<f64>,
-    /// Mean change of the view.
+    /// Mean change of scale of the inliers' windows.
     pub change: Option<f64>,
-    /// Inliers of another motion as a part of those of the motion.
+    /// Inliers of a competing motion over those of the motion; 0 without one.
     pub ambiguity: f64,
-    /// How well another way along the motion fits, as a part of how well the motion fits.
+    /// Fit of another translation along the motion over that of the motion; near 1 on periodic ground.
     pub repetition: f64,
 }

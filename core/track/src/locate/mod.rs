@@ -1,15 +1,15 @@
-//! Stage 4, `locate`: where the target is now. Here the trackers differ, each behind [`Tracker`].
+//! Stage 4, `locate`: finds the target at the current stop. The trackers differ here, each behind [`Tracker`].
 //!
 //! | tracker | steps |
 //! |---|---|
 //! | `template` (Kim et al. 2009) | `scale_roll` → `match_template` → `point_stereo` → `triangulate` |
 //! | `features` (Deans et al. 2005) | `detect` → `match_features` → `triangulate` → `fit_motion` → `bootstrap` |
 //! | `shape` (Deans et al. 2005) | `surface` → `coarse_register` → `refine_register` → `carried_ray` |
-//! | `combined` (D§4) | those of `features` on the way, those of `shape` at the end |
+//! | `combined` (D§4) | those of `features` during the drive, those of `shape` at the end |
 //!
-//! This file is the only one that lists the trackers. A trait with associated types cannot be a trait object, so that
-//! memory and evidence of all trackers have one erased form each, an enum: [`TrackerMemory`] and [`Evidence`]. The other
-//! stages handle these two only. A tracker is added by its own folder and one variant of either.
+//! Only this file lists the trackers. A trait with associated types cannot be a trait object, so memory and evidence
+//! have one type-erased form each, an enum: [`TrackerMemory`] and [`Evidence`]. The other stages handle only these
+//! two. A new tracker needs its own folder and one variant of each.
 
 pub mod features;
 pub mod shape_tracker;
@@ -36,14 +36,14 @@ use sightline_geometry::frames::{Pixel, Point3};
 use sightline_record::{Declaration, Record, Stage, Unit};
 use sightline_vision::image::GrayImage;
 
-/// Where the target is now, and how that was found; by default nowhere.
+/// The target at the current stop and the evidence for it; by default not located.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Located {
     /// Position in the left image, px.
     pub left_pixel: Option<Pixel>,
     /// Position in the right image, px.
     pub right_pixel: Option<Pixel>,
-    /// The error of the left position against the designated point, template drift included.
+    /// The error of the left position relative to the designated point, template drift included.
     pub left_error: Drift,
     /// Position in the rover frame, m.
     #[schema(value_type = Option<[f64; 3]>)]
@@ -51,15 +51,15 @@ pub struct Located {
     /// Covariance of that position, m², for cameras that point as measured; `update` adds the error of the mast angles.
     #[schema(value_type = Option<Vec<f64>>)]
     pub covariance_in_rover: Option<Matrix3<f64>>,
-    /// How the surface point moves with the left pixel, m per px.
+    /// Derivative of the surface point with respect to the left pixel, m per px.
     #[schema(value_type = Option<Vec<f64>>)]
     pub surface_by_pixel: Option<Matrix3x2<f64>>,
-    /// Confidence, from 0 to 1: for `template` the score of the match, cut at 0; for `features` D-Eq 7; where the shape
-    /// decides, the share of the target's pixels that both surfaces cover.
+    /// Confidence, 0 to 1: for `template` the score of the match, at least 0; for `features` D-Eq 7; if located by
+    /// shape, the share of the target's pixels that both surfaces cover.
     pub confidence: f64,
-    /// What could not be found and why, as one sentence.
+    /// What is missing and why, as one sentence; null if nothing is.
     pub missing: Option<String>,
-    /// What the tracker measured at this stop.
+    /// The tracker's measurements at this stop.
     pub evidence: Evidence,
 }
 
@@ -84,13 +84,13 @@ impl Located {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "tracker", rename_all = "snake_case")]
 pub enum Evidence {
-    /// Of the template tracker.
+    /// Evidence of the template tracker.
     Template(Box<TemplateEvidence>),
-    /// Of the feature tracker.
+    /// Evidence of the feature tracker.
     Features(Box<FeatureEvidence>),
-    /// Of the shape tracker.
+    /// Evidence of the shape tracker.
     Shape(Box<ShapeEvidence>),
-    /// Of the combined tracker.
+    /// Evidence of the combined tracker.
     Combined(Box<ShapeEvidence>),
 }
 
@@ -101,7 +101,7 @@ impl Default for Evidence {
 }
 
 impl Evidence {
-    /// The tracker that observed it.
+    /// The tracker that produced the evidence.
     pub const fn tracker(&self) -> TrackerKind {
         match self {
             Self::Template(_) => TrackerKind::Template,
@@ -111,8 +111,7 @@ impl Evidence {
         }
     }
 
-    /// The evidence of the template tracker, to be changed: of every step, or of the designation, which all trackers
-    /// leave to point stereo.
+    /// Mutable evidence of the template tracker; of another tracker the evidence of its designation by point stereo.
     pub fn template_mut(&mut self) -> Option<&mut TemplateEvidence> {
         match self {
             Self::Template(evidence) => Some(evidence),
@@ -124,7 +123,7 @@ impl Evidence {
         }
     }
 
-    /// The evidence of the template tracker; at the designation that of point stereo, which all trackers use there.
+    /// The evidence of the template tracker; of another tracker that of its designation by point stereo.
     pub fn template(&self) -> Option<&TemplateEvidence> {
         match self {
             Self::Template(evidence) => Some(evidence),
@@ -136,7 +135,7 @@ impl Evidence {
         }
     }
 
-    /// The evidence of the feature tracker, where features are followed.
+    /// The evidence of the feature tracker, alone or combined.
     pub fn features(&self) -> Option<&FeatureEvidence> {
         match self {
             Self::Template(_) => None,
@@ -153,7 +152,7 @@ impl Evidence {
         }
     }
 
-    /// The gates of an update.
+    /// Returns the gates of an update.
     pub fn gates(&self, input: &GateInput<'_>) -> Vec<Gate> {
         match self {
             Self::Template(evidence) => TemplateTracker.gates(evidence, input),
@@ -168,18 +167,18 @@ impl Evidence {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "tracker", rename_all = "snake_case")]
 pub enum TrackerMemory {
-    /// Of the template tracker.
+    /// Memory of the template tracker.
     Template(Box<TemplateMemory>),
-    /// Of the feature tracker.
+    /// Memory of the feature tracker.
     Features(Anchors),
-    /// Of the shape tracker.
+    /// Memory of the shape tracker.
     Shape(Views),
-    /// Of the combined tracker.
+    /// Memory of the combined tracker.
     Combined(CombinedMemory),
 }
 
 impl TrackerMemory {
-    /// The tracker whose memory it is.
+    /// The tracker of this memory.
     pub const fn tracker(&self) -> TrackerKind {
         match self {
             Self::Template(_) => TrackerKind::Template,
@@ -189,7 +188,7 @@ impl TrackerMemory {
         }
     }
 
-    /// The memory of the template tracker.
+    /// The memory of the template tracker; `None` for another one.
     pub fn template(&self) -> Option<&TemplateMemory> {
         match self {
             Self::Template(memory) => Some(memory),
@@ -197,7 +196,7 @@ impl TrackerMemory {
         }
     }
 
-    /// The memory of the feature tracker, where features are followed.
+    /// The memory of the feature tracker, alone or combined.
     pub const fn features(&self) -> Option<&Anchors> {
         match self {
             Self::Features(memory) => Some(memory),
@@ -206,26 +205,26 @@ impl TrackerMemory {
         }
     }
 
-    /// The stop of the current template; `None` for a tracker without one.
+    /// The step of the current template; `None` for a tracker without one.
     pub fn template_step(&self) -> Option<usize> {
         self.template().map(|memory| memory.appearance.step)
     }
 
-    /// The stop whose left image the current template is cut from, where that image was released.
+    /// The step whose left image contains the current template, if that image was released.
     pub fn lacks_image_of(&self) -> Option<usize> {
         self.template().filter(|memory| memory.appearance.image.is_empty())?;
         self.template_step()
     }
 
-    /// Sets the image of the current template: the left one of the stop [`Self::lacks_image_of`], or an empty one to
-    /// release it.
+    /// Sets the image of the current template: the left image of the step [`Self::lacks_image_of`], or an empty one
+    /// to release it.
     pub fn set_image(&mut self, image: Arc<GrayImage>) {
         if let Self::Template(memory) = self {
             memory.appearance.image = image;
         }
     }
 
-    /// The memory after an accepted update; evidence of another tracker leaves it as it is.
+    /// Returns the memory after an accepted update; evidence of another tracker does not change it.
     #[must_use]
     pub fn remember(self, evidence: &Evidence, update: &Accepted<'_>) -> Self {
         match (self, evidence) {
@@ -246,7 +245,7 @@ impl TrackerMemory {
     }
 }
 
-/// Finds the position of a designated pixel by the tracker of the settings.
+/// Locates a designated pixel with the tracker of the settings.
 pub fn designate(input: &DesignateInput<'_>) -> (Located, Option<TrackerMemory>) {
     match input.settings.tracker {
         TrackerKind::Template => {
@@ -269,7 +268,7 @@ pub fn designate(input: &DesignateInput<'_>) -> (Located, Option<TrackerMemory>)
     }
 }
 
-/// Finds the target again by the tracker whose memory it has.
+/// Locates the target with the tracker of its memory.
 pub fn locate(input: &LocateInput<'_>, memory: &TrackerMemory) -> Located {
     match memory {
         TrackerMemory::Template(memory) => {

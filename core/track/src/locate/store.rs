@@ -1,19 +1,19 @@
-//! A store that the targets of a traverse share: results that depend on a stop and on settings alone (R207).
+//! A store shared by the targets of a traverse: results that depend only on a stop and on settings (R207).
 //!
-//! Images, features, surfaces and motions are functions of the files, the cameras and the settings, so that keeping them
-//! changes nothing but the time: five targets, a second run or a step back find them ready. All traverses of a program
-//! may share one [`Cache`] with a limit in bytes: the least recently used value is forgotten first, of whichever traverse
-//! and type. A traverse that goes away takes its values along.
+//! Images, features, surfaces and motions are functions of the files, the cameras and the settings, so that storing
+//! them changes nothing but the time: other targets, a second run or a step back reuse them. All traverses of a
+//! program may share one [`Cache`] with a limit in bytes, which evicts the least recently used value of any traverse
+//! and type. Dropping the store of a traverse removes its values.
 
 use std::any::Any;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// The memory that a cache may take unless its program says otherwise, bytes: 64 pairs of 1024 × 1024.
+/// The default limit of a cache, bytes: 64 pairs of 1024 × 1024.
 pub const CACHE_BYTES: usize = 512 << 20;
 
-/// A value that can say how much memory it takes.
+/// A value that reports its memory.
 pub trait HeapBytes {
-    /// Memory outside of the value itself, bytes; small parts may be left out.
+    /// Memory outside of the value itself, bytes; small parts may be omitted.
     fn heap_bytes(&self) -> usize;
 }
 
@@ -26,12 +26,12 @@ struct Entries {
     all: Vec<Entry>,
     bytes: usize,
     limit_bytes: usize,
-    /// Counts uses: a larger number is a later one.
+    /// Number of uses so far; a larger number is a later use.
     clock: u64,
     last_owner: u64,
 }
 
-/// A value with what it was found for.
+/// A value with its owner and its last use.
 #[derive(Debug)]
 struct Entry {
     owner: u64,
@@ -45,12 +45,12 @@ struct Entry {
 type Item<K, S, V> = (K, S, Arc<V>);
 
 impl Cache {
-    /// A cache of at most so many bytes.
+    /// Creates a cache of at most `limit_bytes`.
     pub fn new(limit_bytes: usize) -> Self {
         Self(Mutex::new(Entries { all: Vec::new(), bytes: 0, limit_bytes, clock: 0, last_owner: 0 }))
     }
 
-    /// The memory that the values take, bytes.
+    /// Memory of all values, bytes.
     pub fn bytes(&self) -> usize {
         self.lock().bytes
     }
@@ -68,7 +68,7 @@ impl Default for Cache {
 }
 
 impl Entries {
-    /// The place of the value that an owner has for a key.
+    /// The index of an owner's value for a key.
     fn find<K, S, V>(&self, owner: u64, key: &K, settings: &S) -> Option<usize>
     where
         K: PartialEq + 'static,
@@ -85,7 +85,7 @@ impl Entries {
         self.bytes -= self.all.swap_remove(place).bytes;
     }
 
-    /// Removes the least recently used of the entries that are meant.
+    /// Removes the least recently used entry among those for which `is_meant` is true.
     fn remove_oldest(&mut self, is_meant: impl Fn(&Entry) -> bool) {
         let meant = self.all.iter().enumerate().filter(|(_, entry)| is_meant(entry));
         if let Some((place, _)) = meant.min_by_key(|(_, entry)| entry.used) {
@@ -102,7 +102,7 @@ pub struct SharedStore {
 }
 
 impl Default for SharedStore {
-    /// A store with a cache of its own.
+    /// Creates a store with a cache of its own.
     fn default() -> Self {
         Self::within(&Arc::default())
     }
@@ -118,7 +118,7 @@ impl Drop for SharedStore {
 }
 
 impl SharedStore {
-    /// A store within a cache that others use, too.
+    /// Creates a store within a shared cache.
     pub fn within(cache: &Arc<Cache>) -> Self {
         let owner = {
             let mut entries = cache.lock();
@@ -128,7 +128,7 @@ impl SharedStore {
         Self { cache: Arc::clone(cache), owner }
     }
 
-    /// The kept value of `key` and `settings`, or the one that `find` returns; at most `limit` of its type are kept.
+    /// Returns the stored value of `key` and `settings`, or stores that of `find`; keeps at most `limit` values of its type.
     pub fn get<K, S, V>(&self, key: K, settings: &S, limit: usize, find: impl FnOnce() -> V) -> Arc<V>
     where
         K: PartialEq + Send + 'static,
@@ -138,7 +138,7 @@ impl SharedStore {
         self.kept(&key, settings).unwrap_or_else(|| self.keep(key, settings, limit, Arc::new(find())))
     }
 
-    /// The same for a computation that may fail; a failure is not kept.
+    /// As [`Self::get`], for a computation that may fail; a failure is not stored.
     ///
     /// # Errors
     /// Those of `find`.
@@ -160,7 +160,8 @@ impl SharedStore {
         }
     }
 
-    /// The kept value. Nobody waits while one is being found: what two find at once is the same.
+    /// Returns the stored value. Concurrent computations of the same value do not wait for each other: their results
+    /// are equal.
     pub fn kept<K, S, V>(&self, key: &K, settings: &S) -> Option<Arc<V>>
     where
         K: PartialEq + Send + 'static,
@@ -174,8 +175,8 @@ impl SharedStore {
         entries.all[place].item.downcast_ref::<Item<K, S, V>>().map(|(_, _, value)| Arc::clone(value))
     }
 
-    /// Keeps a value, and forgets the least recently used ones beyond the limits: `limit` values of its type, and the bytes
-    /// of the cache.
+    /// Stores a value and evicts the least recently used ones beyond the limits: `limit` values of its type, and the
+    /// bytes of the cache.
     pub fn keep<K, S, V>(&self, key: K, settings: &S, limit: usize, value: Arc<V>) -> Arc<V>
     where
         K: PartialEq + Send + 'static,
@@ -208,7 +209,7 @@ impl SharedStore {
 pub struct Shared<'a> {
     /// The store.
     pub store: &'a SharedStore,
-    /// The stop of the recording, however a study numbers those that it visits.
+    /// Index of the stop in the recording, independent of the numbering in a study.
     pub stop: usize,
 }
 
@@ -218,7 +219,7 @@ impl std::fmt::Debug for Shared<'_> {
     }
 }
 
-/// A result of one stop, kept where there is a store.
+/// Returns the result of one stop, from the store if there is one.
 ///
 /// # Errors
 /// Those of `find`; a failure is not kept.
@@ -242,7 +243,7 @@ where
 mod tests {
     use super::*;
 
-    /// A value of so many bytes.
+    /// A value of this many bytes.
     struct Block(usize);
 
     impl HeapBytes for Block {
@@ -269,7 +270,7 @@ mod tests {
         keep(&one, 1, 1 << 20);
         assert!(!kept(&other, 0) && kept(&one, 0) && kept(&one, 1));
         assert!((2 << 20..3 << 20).contains(&cache.bytes()), "{}", cache.bytes());
-        // One that is larger than the cache is not kept, and takes all others with it.
+        // A value larger than the cache is not kept, and evicts all others.
         keep(&other, 7, 4 << 20);
         assert!(!kept(&other, 7) && cache.bytes() == 0);
     }

@@ -3,8 +3,8 @@
 //! A tracker owns three things: its *memory*, which is all that it carries from stop to stop; its *evidence*, which is
 //! everything it observed at one stop; and its *gates*. The stages around it use neither memory nor evidence.
 //!
-//! A tracker never fails: where it finds nothing, `Sighting::missing` gives the reason and `judge` rejects the update. The
-//! same input gives the same bits.
+//! A tracker never fails: if it finds nothing, `Sighting::missing` gives the reason and `judge` rejects the update.
+//! The same input gives the same bits.
 
 use nalgebra::{Matrix3, Matrix3x2};
 use serde::Serialize;
@@ -23,12 +23,12 @@ use sightline_geometry::estimate::drift::Drift;
 use sightline_geometry::frames::{Pixel, Point3, Pose};
 use sightline_geometry::stereo_geometry::StereoGeometry;
 
-/// A way of finding a target again.
+/// A method of tracking a target.
 pub trait Tracker {
-    /// What is carried from stop to stop. Serialised, it may leave out what can be computed again from the images of the
-    /// stops that it names.
+    /// The state carried from stop to stop. Its serialised form may omit data that can be computed again from the
+    /// images of the stops that it names.
     type Memory: Clone + PartialEq + Serialize + DeserializeOwned;
-    /// Everything that was observed at one stop.
+    /// All observations at one stop.
     type Evidence: Clone + PartialEq + Default + Serialize + DeserializeOwned;
 
     /// The gates of this tracker.
@@ -36,16 +36,16 @@ pub trait Tracker {
     /// Its steps in running order: names of stages of the record.
     const STEPS: &'static [&'static str];
 
-    /// Finds the position of a designated pixel; no memory where there is no position.
+    /// Locates a designated pixel; there is no memory without a position.
     fn designate(&self, input: &DesignateInput<'_>) -> (Sighting<Self::Evidence>, Option<Self::Memory>);
 
-    /// Finds the target again after a move.
+    /// Locates the target at a later stop.
     fn locate(&self, input: &LocateInput<'_>, memory: &Self::Memory) -> Sighting<Self::Evidence>;
 
-    /// The gates of an update, in the order in which they are shown. A value that was not reached is `None`, and fails.
+    /// Returns the gates of an update, in display order. A value that was not reached is `None`, and fails.
     fn gates(&self, evidence: &Self::Evidence, input: &GateInput<'_>) -> Vec<Gate>;
 
-    /// The memory after an accepted update; a rejected one leaves it as it is.
+    /// Returns the memory after an accepted update; a rejected one does not change it.
     fn remember(
         &self,
         memory: Self::Memory,
@@ -54,33 +54,33 @@ pub trait Tracker {
     ) -> Self::Memory;
 }
 
-/// Where a tracker found the target, with its evidence; by default nowhere.
+/// A target located by a tracker, with its evidence; by default not located.
 ///
-/// The fields are those of [`super::Located`], which holds the evidence of any tracker.
+/// The fields are those of [`super::Located`], which contains the evidence of any tracker.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sighting<E> {
     /// Position in the left image, px.
     pub left_pixel: Option<Pixel>,
     /// Position in the right image, px.
     pub right_pixel: Option<Pixel>,
-    /// The error of the left position against the designated point, template drift included.
+    /// The error of the left position relative to the designated point, template drift included.
     pub left_error: Drift,
     /// Position in the rover frame, m.
     pub position_in_rover: Option<Point3>,
     /// Covariance of that position, m².
     pub covariance_in_rover: Option<Matrix3<f64>>,
-    /// Derivative of the surface point by the left pixel, m per px.
+    /// Derivative of the surface point with respect to the left pixel, m per px.
     pub surface_by_pixel: Option<Matrix3x2<f64>>,
     /// Confidence, from 0 to 1.
     pub confidence: f64,
     /// Why there is no position: a failure of the tracker, as one sentence.
     pub missing: Option<String>,
-    /// What was observed.
+    /// The evidence.
     pub evidence: E,
 }
 
 impl<E> Sighting<E> {
-    /// The same sighting with other evidence, and the evidence it had.
+    /// Replaces the evidence; also returns the previous one.
     pub fn replace<F>(self, evidence: F) -> (Sighting<F>, E) {
         let sighting = Sighting {
             left_pixel: self.left_pixel,
@@ -98,13 +98,13 @@ impl<E> Sighting<E> {
 }
 
 impl<E: Default> Sighting<E> {
-    /// No position, for a reason.
+    /// A sighting without a position, for a reason.
     pub fn nothing(missing: impl std::fmt::Display, evidence: E) -> Self {
         Self { missing: Some(missing.to_string()), evidence, ..Self::default() }
     }
 }
 
-/// What a tracker's gates may depend on beside its evidence.
+/// The input of a tracker's gates besides its evidence.
 #[derive(Clone, Debug)]
 pub struct GateInput<'a> {
     /// Whether a position was found.
@@ -121,35 +121,35 @@ pub struct GateInput<'a> {
     pub limits: &'a Limits,
 }
 
-/// An accepted update, as a tracker remembers it.
+/// An accepted update, for the memory of a tracker.
 #[derive(Clone, Copy, Debug)]
 pub struct Accepted<'a> {
-    /// The stop, from 0.
+    /// The step, from 0.
     pub step: usize,
     /// The left camera.
     pub left: &'a Camera,
     /// The stereo pair.
     pub capture: &'a Capture,
-    /// The estimated pose.
+    /// The estimated rover pose.
     pub site_from_rover: &'a Pose,
     /// Position in the left image, px.
     pub left_pixel: Option<Pixel>,
-    /// The error of the left position against the designated point.
+    /// The error of the left position relative to the designated point.
     pub left_error: Drift,
     /// Position in the rover frame, m.
     pub position_in_rover: Point3,
-    /// Derivative of the surface point by the left pixel, m per px.
+    /// Derivative of the surface point with respect to the left pixel, m per px.
     pub surface_by_pixel: Option<Matrix3x2<f64>>,
-    /// The configuration.
+    /// The settings.
     pub settings: &'a Settings,
 }
 
-/// What a tracker is given at the stop of the designation.
+/// The input of a tracker at the stop of the designation.
 #[derive(Clone, Copy, Debug)]
 pub struct DesignateInput<'a> {
-    /// The stop.
+    /// The step, from 0.
     pub step: usize,
-    /// The estimated pose there.
+    /// The estimated rover pose.
     pub site_from_rover: &'a Pose,
     /// The designated position in the left image, px.
     pub pixel: Pixel,
@@ -159,50 +159,50 @@ pub struct DesignateInput<'a> {
     pub left: &'a Camera,
     /// The right camera.
     pub right: &'a Camera,
-    /// How the two images relate.
+    /// The relation of the two views.
     pub stereo: StereoGeometry,
-    /// What the targets of the traverse share.
+    /// The store shared by the targets of the traverse.
     pub shared: Option<Shared<'a>>,
-    /// The configuration.
+    /// The settings.
     pub settings: &'a Settings,
-    /// Once requested, the tracker returns anything soon: the sighting is discarded.
+    /// Once requested, the tracker returns early; the sighting is discarded.
     pub cancel: Cancel<'a>,
 }
 
-/// What a tracker is given at every later stop.
+/// The input of a tracker at every later stop.
 #[derive(Clone, Copy, Debug)]
 pub struct LocateInput<'a> {
-    /// Where it should be.
+    /// The predicted target.
     pub prediction: &'a Prediction,
     /// Camera models and the predicted pixels.
     pub pointing: &'a Pointing,
     /// The stereo pair.
     pub capture: &'a Capture,
-    /// The estimated pose at this stop.
+    /// The estimated rover pose at this stop.
     pub site_from_rover: &'a Pose,
-    /// How the two images relate.
+    /// The relation of the two views.
     pub stereo: StereoGeometry,
-    /// What the targets of the traverse share.
+    /// The store shared by the targets of the traverse.
     pub shared: Option<Shared<'a>>,
-    /// Which stop of the drive this is.
+    /// The stop within its drive.
     pub place: Place,
-    /// Updates in a row that were bad so far.
+    /// Number of consecutive bad updates so far.
     pub lost_count: u32,
-    /// Whether the target was found at the stop before.
+    /// Whether the target was located at the previous stop.
     pub was_found: bool,
-    /// The configuration.
+    /// The settings.
     pub settings: &'a Settings,
-    /// Once requested, the tracker returns anything soon: the sighting is discarded.
+    /// Once requested, the tracker returns early; the sighting is discarded.
     pub cancel: Cancel<'a>,
 }
 
-/// A stop among those of its drive.
+/// A stop within its drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Place {
-    /// The stop, from 0.
+    /// The step, from 0.
     pub step: usize,
-    /// Whether its cameras are others than those of the stop before: the target is handed over (R205).
+    /// Whether its cameras differ from those of the previous stop: a hand-off (R205).
     pub is_hand_over: bool,
-    /// Whether the drive ends here, or other cameras take over at the next stop.
+    /// Whether the drive ends here, or the next stop is a hand-off.
     pub is_last_of_pair: bool,
 }

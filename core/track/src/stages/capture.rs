@@ -1,7 +1,7 @@
 //! Stage 3, `capture`: the stereo pair of this stop and the subframe around the prediction (K§4.1 step 2, R31).
 //!
-//! The subframe is what the flight software downlinks and exposes for: 161 × 161 px around the prediction.
-//! In a replay the exposure is the recorded one; its mean and its saturated share in the subframe are reported.
+//! The subframe is the part that the flight software downlinks and that sets the exposure: 161 × 161 px around the
+//! prediction. In a replay the exposure is the recorded one; its mean and its saturated share in the subframe are reported.
 
 use std::sync::Arc;
 
@@ -28,14 +28,14 @@ impl HeapBytes for StereoPair {
     }
 }
 
-/// The stereo pair with what is known of its exposure.
+/// The stereo pair with its exposure in the subframe.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Capture {
     /// Size of the left image (width, height), px.
     pub left_size: [u32; 2],
     /// Size of the right image (width, height), px.
     pub right_size: [u32; 2],
-    /// The subframe around the prediction, cut to the image; null when the prediction is not in it.
+    /// The subframe around the prediction, clipped to the image; null if the prediction is outside it.
     pub subframe: Option<PixelRect>,
     /// Mean grey value in the subframe, as a fraction of full scale.
     pub subframe_mean: Option<f32>,

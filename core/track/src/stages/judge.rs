@@ -1,7 +1,7 @@
 //! Stage 5, `judge`: compares gates with their limits and runs the state machine (K§4.6, R81–R91).
 //!
-//! The tracker lists its gates (`locate/*/gates.rs`); an update is good where all of them are passed. Two gates are computed
-//! here, for every tracker that uses them:
+//! The tracker lists its gates (`locate/*/gates.rs`); an update is good if all of them are passed. Two gates are
+//! computed here, for every tracker that uses them:
 //!
 //! | gate | value | limit |
 //! |---|---|---|
@@ -21,7 +21,7 @@
 //! | f | `limits.navigation_error_fraction` | – |
 //! | f_p, B | effective focal length at the target, distance of the camera centres | px, m |
 //! | σ_m | largest 1σ of `Pointing::error_covariance_in_rover`: the mast's error at D_new, 0 without a known one (ours) | m |
-//! | L_step, L_total | driven since the last accepted update, since designation | m |
+//! | L_step, L_total | distance driven since the last accepted update, since the designation | m |
 
 use crate::gate::{DISTANCE_CORRECTION, POSITION_CORRECTION};
 use crate::limits::Limits;
@@ -113,7 +113,7 @@ impl<'a> Tolerance<'a> {
         }
     }
 
-    /// K-Eq 1, m.
+    /// The stereo range error ΔR of K-Eq 1, m.
     fn stereo_m(&self, distance_m: f64) -> f64 {
         distance_m * distance_m * self.limits.disparity_error_px / (self.focal_px * self.baseline_m)
     }
@@ -127,7 +127,7 @@ impl<'a> Tolerance<'a> {
     fn position_m(&self, target: &Target, prediction: &Prediction, new_m: f64) -> f64 {
         let navigation = self.limits.navigation_error_fraction * prediction.travelled_m;
         let stereo = self.stereo_m(target.initial_distance_m).hypot(self.stereo_m(new_m));
-        // Half a pixel of the first image, seen from where the rover is now (R40).
+        // Half a pixel of the first image, at the current distance (R40).
         let designation = 0.5 * target.initial_distance_m / self.focal_px;
         // ΔR is a 3σ error. Both positions, of the designation and of this stop, have an error of the mast.
         let pointing = 3.0 * self.pointing_m * 1f64.hypot(target.initial_distance_m / self.predicted_m);

@@ -1,5 +1,5 @@
-//! The five stages that all trackers share, in running order; the fourth of the loop, `locate`, is where they
-//! differ and lives in `crate::locate`.
+//! The five stages that all trackers share, in running order. The fourth stage, `locate`, differs between trackers
+//! and is in `crate::locate`.
 
 pub mod prediction;
 pub mod predict;

@@ -1,13 +1,13 @@
 //! Stage 2, `point_mast`: the azimuth and elevation that centre the prediction (K§4.1 step 2, R25), and the
 //! camera models at the pointing in use.
 //!
-//! A recorded or rendered traverse is replayed: its pointing stays as it was taken, so that the target appears
-//! off the centre. What is wanted is computed all the same (closed form, domain.md 4.4) and shown beside what
-//! was used. With perfect pose and pointing the target would appear exactly at the image centre (R32).
+//! A recorded or rendered traverse is replayed: its pointing is fixed, so that the target appears off the centre. The
+//! wanted pointing is computed all the same (closed form, domain.md 4.4) and shown beside the used one. With perfect
+//! pose and pointing the target would appear exactly at the image centre (R32).
 //!
-//! The error of the mast angles turns the cameras: a point that is located through them has the covariance Σ_m in the rover
-//! frame (`Mast::pointing_covariance`), and a prediction appears elsewhere by as much. The gate ellipse is the sum seen in
-//! the left image: `J (Σ + Σ_m) Jᵀ` with J = ∂pixel/∂point.
+//! The error of the mast angles rotates the cameras: a point that is located through them has the covariance Σ_m in
+//! the rover frame (`Mast::pointing_covariance`), and a prediction is displaced in the image accordingly. The gate
+//! ellipse is the sum projected into the left image: `J (Σ + Σ_m) Jᵀ` with J = ∂pixel/∂point.
 
 use nalgebra::{Matrix2, Matrix3};
 use serde::{Deserialize, Serialize};
@@ -20,37 +20,38 @@ use sightline_record::{Declaration, Record, Unit};
 /// Pointing and camera models of this stop.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Pointing {
-    /// The angles that would centre the prediction in the left image of the main pair, for which the mast is pointed; null
-    /// for a pair that no mast carries, and out of reach.
+    /// The mast angles that would centre the prediction in the left image of the main pair; null for a pair without a
+    /// mast, or if out of reach.
     pub wanted: Option<MastAngles>,
     /// The angles at which the pair was taken; null without a mast.
     pub used: Option<MastAngles>,
-    /// The left camera of the target's pair in the rover frame, at the pointing used; of the main pair at a stop that lacks it.
+    /// The left camera of the target's pair in the rover frame, at the pointing used; of the main pair if the stop
+    /// lacks that pair.
     pub left: Camera,
     /// The right camera of the same pair in the rover frame, at the pointing used.
     pub right: Camera,
-    /// Covariance Σ_m that the error of the mast angles gives a point located at the prediction, rover frame, m²; null
-    /// without a known error.
+    /// Covariance Σ_m of a point located at the prediction, due to the error of the mast angles, rover frame, m²;
+    /// null without a known error.
     #[serde(default)]
     #[schema(value_type = Option<Vec<f64>>)]
     pub error_covariance_in_rover: Option<Matrix3<f64>>,
-    /// The prediction in the left image, px; null when it is behind the camera.
+    /// The prediction in the left image, px; null if it is behind the camera.
     pub predicted_left: Option<Pixel>,
     /// The prediction in the right image, px.
     pub predicted_right: Option<Pixel>,
-    /// Covariance of the prediction in the left image, px²: the gate.
+    /// Covariance of the prediction in the left image, px²: the gate ellipse.
     #[schema(value_type = Option<Vec<f64>>)]
     pub predicted_covariance_px2: Option<Matrix2<f64>>,
 }
 
-/// The cameras of a stop as they were used.
+/// The cameras of a stop at the pointing used.
 #[derive(Clone, Copy, Debug)]
 pub struct UsedPointing<'a> {
-    /// The mast, where it is known.
+    /// The mast; `None` if unknown.
     pub mast: Option<&'a Mast>,
     /// The angles at which the pair was taken.
     pub angles: Option<MastAngles>,
-    /// Standard deviation of each of these angles, rad; 0 where it is not known.
+    /// Standard deviation of each of these angles, rad; 0 if unknown.
     pub error_rad: f64,
     /// The left camera in the rover frame.
     pub left: &'a Camera,
@@ -60,7 +61,7 @@ pub struct UsedPointing<'a> {
 
 impl UsedPointing<'_> {
     /// Covariance of a point located by the cameras, from the error of the mast angles alone, rover frame, m²; `None`
-    /// without a known error, and for cameras that no known mast carries.
+    /// without a known error or a known mast.
     pub fn error_covariance(&self, point_in_rover: &Point3) -> Option<Matrix3<f64>> {
         let (mast, angles) = self.mast.zip(self.angles).filter(|_| self.error_rad > 0.0)?;
         Some(mast.pointing_covariance(angles, point_in_rover, self.error_rad))
@@ -88,8 +89,8 @@ pub fn point_mast(
     }
 }
 
-/// The pointing at a stop that lacks the target's pair, with the cameras of its main pair: the target is predicted in no
-/// image, and the mast is not pointed for it.
+/// The pointing at a stop that lacks the target's pair, with the cameras of its main pair: the target is predicted in
+/// neither image, and the mast is not pointed at it.
 pub fn without_pair(left: &Camera, right: &Camera) -> Pointing {
     Pointing {
         wanted: None,
@@ -168,7 +169,7 @@ mod tests {
             let [before, after] = [&exact, &pointed].map(|p| p.predicted_covariance_px2.unwrap());
             let focal_px = left.model.focal_length_px(left.centre_pixel()).unwrap();
             let added = (after - before).symmetric_eigenvalues();
-            // The azimuth turns the line of sight by less where it looks down.
+            // The azimuth rotates the line of sight by less if it looks down.
             let expected = [focal_px * error_rad * angles.elevation_rad.cos(), focal_px * error_rad];
             for (variance_px2, expected_px) in [added.min(), added.max()].into_iter().zip(expected) {
                 // The cameras are 15 cm beside the axes, which shortens or lengthens the arm at 2 m.

@@ -1,15 +1,15 @@
-//! Stage 1, `predict`: where the target should be now, by dead reckoning (K§4.1 step 1, R24).
+//! Stage 1, `predict`: predicts the target at this stop by dead reckoning (K§4.1 step 1, R24).
 //!
 //! With the rover's estimated pose (R_i, t_i) mapping rover → site,
 //! `p_rover,new = R_newᵀ (R_old p_rover,old + t_old − t_new)`, that is
 //! `now_from_then = site_from_rover_nowⁱⁿᵛ · site_from_rover_then`.
 //!
-//! The covariance turns with the motion and grows by the error of the pose change: with a driven distance L,
-//! `Σ_t = R_d diag((f_along L)², (f_across L)², (f_across L)²) R_dᵀ` along and across the driven direction, and
-//! an attitude error of σ_a about each axis moves the target by `[p]×`: `Σ_a = σ_a² [p]× [p]×ᵀ`.
-//! The papers give no covariance for the prediction; this is ours, with the error model of the traverse.
+//! The covariance is rotated with the motion and grows by the error of the pose change: with a driven distance L,
+//! `Σ_t = R_d diag((f_along L)², (f_across L)², (f_across L)²) R_dᵀ` along and across the driven direction, and an
+//! attitude error of σ_a about each axis moves the target by `[p]×`: `Σ_a = σ_a² [p]× [p]×ᵀ`. The papers give no
+//! covariance for the prediction; this is ours, with the error model of the traverse.
 //!
-//! Where vision measured the motion with covariance Σ of (τ, ω), the target moves by `τ + ω × p`: `J Σ Jᵀ`, `J = [I, −[p]×]`.
+//! If vision measured the motion with covariance Σ of (τ, ω), the target moves by `τ + ω × p`: `J Σ Jᵀ`, `J = [I, −[p]×]`.
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
@@ -38,7 +38,7 @@ pub fn predict(
     let position_in_rover = now_from_then * target.position_in_rover;
     let rotation = now_from_then.rotation.to_rotation_matrix();
     let turned = rotation.matrix() * target.covariance_in_rover * rotation.matrix().transpose();
-    // The way driven, seen from the new rover frame.
+    // The translation, in the new rover frame.
     let way = now_from_then.translation.vector;
     let step_length_m = way.norm();
     Prediction {
@@ -51,15 +51,13 @@ pub fn predict(
     }
 }
 
-/// `prediction` as a person displaced it: on the line of sight of `pixel`, as far from the left camera's centre as
-/// before.
+/// `prediction` as displaced by a user: on the line of sight of `pixel`, at the same distance from the left camera's centre.
 ///
-/// Of the ways that a pixel leaves open this one keeps the scale by the ratio of distances (K-Eq 6) and every tolerance
-/// of `judge`, so that the displacement is one across the line of sight and nothing else. With the ray `o + t d`, the
-/// camera's centre C and the distance D, `t = b + √(b² − |o − C|² + D²)`, `b = (C − o)·d`: in a CAHVORE lens light does
-/// not enter at C. The covariance is kept.
+/// This choice keeps the scale by the ratio of distances (K-Eq 6) and every tolerance of `judge`, so that the
+/// displacement is only across the line of sight. With the ray `o + t d`, the camera's centre C and the distance D,
+/// `t = b + √(b² − |o − C|² + D²)`, `b = (C − o)·d`: rays of a CAHVORE camera do not start at C. The covariance is kept.
 ///
-/// None where the pixel sees nothing.
+/// `None` if the pixel has no ray.
 pub fn displaced(
     prediction: &Prediction,
     left: &Camera,
@@ -80,7 +78,7 @@ pub fn displaced(
     })
 }
 
-/// What the error of one pose change adds to the covariance of a point, m², rover frame.
+/// The covariance that the error of one pose change adds to a point, m², rover frame.
 fn motion_covariance(point: &Point3, way: &Vector3, error: &PoseChangeError) -> Matrix3<f64> {
     let cross = point.coords.cross_matrix();
     let odometry = match error {

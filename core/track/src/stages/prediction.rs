@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 
 use sightline_geometry::frames::Point3;
 
-/// Where the target should be now.
+/// The predicted target at this stop.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Prediction {
     /// Position in the rover frame of this stop, m.

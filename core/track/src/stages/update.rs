@@ -1,9 +1,9 @@
 //! Stage 6, `update`: the next target (K§4.1 step 5, R28, R70, R78, R92).
 //!
-//! An accepted update renews the position and its covariance, to which that of the mast angles' error is added. It lets the
-//! tracker renew its memory: the template tracker its template, where the setting `template_update` asks for it (R70, R71),
-//! the feature tracker the stops from which it measures motions (R186), the shape tracker its last view (R189, R205).
-//! Otherwise the position is carried by the prediction alone and the memory stays.
+//! An accepted update replaces the position and its covariance, to which that of the mast angles' error is added. It
+//! also lets the tracker renew its memory: the template tracker its template, as the setting `template_update`
+//! requires (R70, R71), the feature tracker the stops from which it measures motions (R186), the shape tracker its
+//! last view (R189, R205). Otherwise the position is carried by the prediction alone and the memory is unchanged.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -18,22 +18,22 @@ use crate::verdict::Verdict;
 use sightline_geometry::frames::{Pixel, Pose};
 use sightline_record::{Declaration, Record, Unit};
 
-/// What this stop leaves to the next.
+/// The state that this stop passes to the next.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Updated {
     /// The target.
     pub target: Target,
     /// The tracking state.
     pub state: TrackingState,
-    /// Whether the template was taken anew.
+    /// Whether the template was renewed.
     pub template_renewed: bool,
-    /// How far the located position lies from the predicted one, m (Kim09 §4.1).
+    /// Distance of the located position from the predicted one, m (Kim09 §4.1).
     pub correction_m: Option<f64>,
-    /// How far the match lies from the predicted pixel, px (Kim09 §7.2).
+    /// Distance of the match from the predicted pixel, px (Kim09 §7.2).
     pub correction_px: Option<f64>,
 }
 
-/// The next target from an update that was judged; `carried` is the target as [`carry`] brought it to this stop.
+/// Returns the next target after a judged update; `carried` is the target moved to this stop by [`carry`].
 pub fn update(
     carried: Target,
     pointing: &Pointing,
@@ -81,7 +81,7 @@ pub fn carry(target: &Target, step: usize, prediction: &Prediction) -> Target {
     }
 }
 
-/// The carried target with the position as located.
+/// The carried target with the located position.
 fn found_again(carried: &Target, pointing: &Pointing, located: &Located) -> Option<Target> {
     let (position_in_rover, covariance) = located.position_in_rover.zip(located.covariance_in_rover)?;
     Some(Target {

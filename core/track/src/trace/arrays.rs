@@ -1,4 +1,4 @@
-//! The arrays of a step, which are fetched one by one by [`ArrayName`] and drawn.
+//! The arrays of a step, which are fetched one by one by [`ArrayName`].
 //!
 //! A name is looked up among the declarations of all stages (`records`).
 
@@ -15,7 +15,7 @@ use crate::records;
 use sightline_record::{ArrayDecl, ArrayView};
 
 impl StepTrace {
-    /// An array of this step, where the stage that makes it was reached.
+    /// Returns an array of this step; `None` if its stage was not reached.
     pub fn array(&self, name: ArrayName) -> Option<ArrayView<'_>> {
         records::array(self, name.word())
     }
@@ -27,12 +27,12 @@ impl ArrayName {
         records::arrays().map(|array| Self::new(array.name.as_ref()))
     }
 
-    /// The array of that name.
+    /// Returns the array with this name.
     pub fn from_word(word: &str) -> Option<Self> {
         Self::all().find(|name| name.word() == word)
     }
 
-    /// The declaration.
+    /// The declaration of the array.
     pub fn declaration(self) -> Option<&'static ArrayDecl> {
         records::arrays().find(|array| array.name == self.word())
     }

@@ -1,19 +1,19 @@
-//! Coarse-to-fine search: every position at a coarse level, then the neighbourhood of the best ones (R64, R65).
+//! Coarse-to-fine search: all positions at a coarse level, then the neighbourhood of the best ones (R64, R65).
 //!
 //! Template and region are halved `levels` times (`image::pyramid`). At the coarsest level every position is compared;
-//! its highest local maxima are the candidates. At each finer level a candidate is looked for within `reach_px` of where
-//! the coarser level put it, and so down to whole pixels of the image, where the neighbours that the sub-pixel
-//! fit needs are compared too. An exhaustive surface is never built: the returned one holds the visited
-//! positions and NaN elsewhere.
+//! its highest local maxima are the candidates. At each finer level a candidate is searched for within `reach_px` of its
+//! position at the coarser level, down to whole pixels of the image, where the neighbours required by the sub-pixel fit
+//! are compared too. An exhaustive score map is never built: the returned one contains the visited positions and NaN
+//! elsewhere.
 //!
-//! Coarse levels are compared by normalised correlation whatever the measure (R65): the signs of a difference of
-//! Gaussians are those of another band at every level, and too few in a small template. The measure itself decides
-//! among the whole pixels.
+//! Coarse levels are compared by normalised correlation for every measure (R65): the signs of a difference of Gaussians
+//! belong to another band at every level, and are too few in a small template. The measure itself decides among the
+//! whole pixels.
 //!
-//! *Ours:* candidates are local maxima and not just high scores, which would all lie on one hill. The coarse levels
-//! lie on every second pixel of the image counted from its first, so that a region's place does not change them. The
-//! template's own coarse levels are made from its surroundings, else its border would be smoothed with other
-//! pixels than the image's.
+//! *Ours:* candidates are local maxima instead of the highest scores, which would all be neighbours. Coarse levels
+//! sample every second pixel of the image counted from its first, so that they do not depend on the region. The
+//! template's own coarse levels are made from its surroundings; otherwise its border would be smoothed with other pixels
+//! than the image's.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -26,54 +26,55 @@ use crate::image::pyramid;
 use crate::image::{GrayImage, PixelRect};
 use sightline_geometry::frames::Pixel;
 
-/// Pixels by which five weights reach over a level's border.
+/// Reach of the five-tap blur beyond a level's border, px.
 const BLUR_REACH_PX: u32 = 2;
 
-/// How the search descends.
+/// Parameters of the coarse-to-fine search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Descent {
-    /// How often template and image are halved.
+    /// Number of times that template and image are halved.
     pub levels: u32,
-    /// How many local maxima of the coarsest level are followed.
+    /// Number of local maxima of the coarsest level to follow.
     pub candidates: usize,
-    /// How far each is looked for at every finer level, px of that level.
+    /// Search radius around each candidate at every finer level, px of that level.
     pub reach_px: u32,
 }
 
-/// A local maximum of the coarsest level and what became of it.
+/// A local maximum of the coarsest level and its final position.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[schema(as = CoarseCandidate)]
 pub struct Candidate {
-    /// Where it lay at the coarsest level, px of the image.
+    /// Position at the coarsest level, px of the image.
     pub coarse_pixel: Pixel,
-    /// Its score there.
+    /// Score at the coarsest level.
     pub coarse_score: f64,
-    /// Where it lay at the end, px.
+    /// Final position, px.
     pub pixel: Pixel,
-    /// Its score there.
+    /// Score at the final position.
     pub score: f64,
 }
 
-/// What a coarse-to-fine search saw.
+/// Record of a coarse-to-fine search.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct CoarseSearch {
     /// Pixels of the image per pixel of the coarsest level.
     pub factor: u32,
-    /// The candidates that were followed, best first by their coarse score.
+    /// The followed candidates, in descending order of their coarse score.
     pub candidates: Vec<Candidate>,
-    /// How many positions were compared, all levels together.
+    /// Number of positions compared, over all levels.
     pub comparisons: u64,
-    /// Scores of all positions of the coarsest level; its pixels are `factor` px of the image. Not serialised: `None` in
-    /// a record that was read from JSON.
+    /// Score map of the coarsest level; its pixels are `factor` px of the image. Not serialised: `None` in a record read
+    /// from JSON.
     #[serde(skip)]
     #[schema(ignore)]
     pub coarse: Option<Surface>,
 }
 
-/// Finds the middle `size` × `size` px of `wide` in `region`: the visited scores at whole pixels, and the record.
+/// Finds the middle `size` × `size` px of `wide` in `region`; returns the visited scores at whole pixels, and the
+/// record.
 ///
-/// `wide` holds what [`Descent::margin_px`] asks for around the template; a narrower one has its border smoothed
-/// with fewer pixels. `None` as for [`Similarity::surface`].
+/// `wide` must contain [`Descent::margin_px`] around the template; the border of a narrower one is smoothed with fewer
+/// pixels. `None` as for [`Similarity::surface`].
 pub fn coarse_to_fine(
     similarity: &Similarity,
     wide: &Patch,
@@ -110,7 +111,7 @@ pub fn coarse_to_fine(
 }
 
 impl Descent {
-    /// How far around a template of `size` px its surroundings are looked at, px.
+    /// Width of the surroundings that the search needs around a template of `size` px, px.
     pub fn margin_px(&self, similarity: &Similarity, size: u32) -> u32 {
         let factor = 1 << self.levels;
         let half = (size / 2).div_ceil(factor) + similarity.margin_px() + BLUR_REACH_PX;
@@ -121,9 +122,9 @@ impl Descent {
 /// Template, image and region at every level, finest first.
 struct Levels<'a> {
     similarity: &'a Similarity,
-    /// Wide template, its side, image, region, at each level.
+    /// Wide template, its side, image and region of each level.
     steps: Vec<(Patch, u32, GrayImage, PixelRect)>,
-    /// The pixel of the image on which (0, 0) of every level lies.
+    /// Pixel of the image at (0, 0) of every level.
     origin: [i32; 2],
     reach_px: u32,
 }
@@ -140,7 +141,7 @@ impl<'a> Levels<'a> {
         let region = region.intersect(&PixelRect::whole(image.width(), image.height()))?;
         let factor = 1_i32 << descent.levels;
         let margin = (descent.margin_px(similarity, size) as i32 / factor + 1) * factor;
-        // On a multiple of the factor, so that levels lie on the same pixels whatever the region.
+        // A multiple of the factor, so that levels sample the same pixels for any region.
         let start = |first: i32| ((first - margin).max(0) / factor) * factor;
         let (x, y) = (start(region.x), start(region.y));
         let end = |first: i32, length: u32, start: i32| (first + length as i32 + margin - start) as u32;
@@ -155,7 +156,7 @@ impl<'a> Levels<'a> {
         for _ in 0..descent.levels {
             let (wide, size, image, region) = steps.last()?;
             let wide = Patch::from(pyramid::halve(evenly_centred(wide)?.image()));
-            // The region's pixels that lie on the coarse grid.
+            // The region's pixels on the coarse grid.
             let first = |v: i32| v.div_euclid(2) + v.rem_euclid(2);
             let last = |v: i32, length: u32| (v + length as i32 - 1).div_euclid(2);
             let (x, y) = (first(region.x), first(region.y));
@@ -167,7 +168,7 @@ impl<'a> Levels<'a> {
         Some(Self { similarity, steps, origin: [part.x, part.y], reach_px: descent.reach_px })
     }
 
-    /// The surface over `region` of a level, in pixels of the level counted from the image's first.
+    /// Score map over `region` of a level, in pixels of the level counted from the image's first.
     fn surface(&self, level: usize, region: PixelRect) -> Option<Surface> {
         let (wide, size, image, _) = self.steps.get(level)?;
         let similarity = if level == 0 { self.similarity } else { &Similarity::Ncc };
@@ -177,7 +178,7 @@ impl<'a> Levels<'a> {
         Some(surface)
     }
 
-    /// All positions of a level, and how many were compared.
+    /// Score map of a whole level, and the number of positions compared.
     fn exhaustive(&self, level: u32) -> Option<(Surface, u64)> {
         let (_, _, _, region) = self.steps.get(level as usize)?;
         let surface = self.surface(level as usize, *region)?;
@@ -185,7 +186,7 @@ impl<'a> Levels<'a> {
         Some((surface, compared))
     }
 
-    /// The surface of the finest level, with no position visited.
+    /// Score map of the finest level, with no position visited.
     fn empty_surface(&self) -> Option<Surface> {
         let (_, size, _, region) = self.steps.first()?;
         let width = (region.width + 1).checked_sub(*size).filter(|w| *w > 0)?;
@@ -201,7 +202,8 @@ impl<'a> Levels<'a> {
         })
     }
 
-    /// Follows a place of the coarsest level down to the image; the visited positions of the finest are filled in.
+    /// Follows a candidate from the coarsest level down to the image; adds the positions visited at the finest to
+    /// `visited`.
     fn follow(
         &self,
         place: [i32; 2],
@@ -224,26 +226,26 @@ impl<'a> Levels<'a> {
         found
     }
 
-    /// Fills the positions of the finest level around a place in; gives how many were compared.
+    /// Compares the positions of a level around a place and adds them to `visited`; returns their number.
     fn visit(&self, level: usize, place: [i32; 2], reach: u32, visited: &mut Surface) -> u64 {
         let Some(near) = self.near(level, place, reach) else { return 0 };
         copy(&near, visited);
         near.scores.len() as u64
     }
 
-    /// The scores of a level within `reach` of a place, as far as the region goes.
+    /// Scores of a level within `reach` of a place, clipped to the region.
     fn near(&self, level: usize, place: [i32; 2], reach: u32) -> Option<Surface> {
         let (_, size, _, region) = self.steps.get(level)?;
         let reach = (size / 2 + reach) as i32;
         let side = 2 * reach as u32 + 1;
         let [x, y] = [place[0] - (self.origin[0] >> level), place[1] - (self.origin[1] >> level)];
         let around = PixelRect::new(x - reach, y - reach, side, side);
-        // A coarse level may round the region outwards by a pixel: the nearest positions inside are taken.
+        // A coarse level may round the region outwards by a pixel: the nearest positions inside are used.
         self.surface(level, around.intersect(region)?)
     }
 }
 
-/// The patch with its middle on an even pixel, cut by one all around where it is not.
+/// The patch with its centre on an even pixel; cropped by one pixel on each side if necessary.
 fn evenly_centred(wide: &Patch) -> Option<Patch> {
     if (wide.width() / 2).is_multiple_of(2) {
         return Some(wide.clone());
@@ -251,7 +253,7 @@ fn evenly_centred(wide: &Patch) -> Option<Patch> {
     patch::middle(wide, wide.width().checked_sub(2)?)
 }
 
-/// Copies the scores of `part` into the surface they belong to.
+/// Copies the scores of `part` into the score map `into`.
 fn copy(part: &Surface, into: &mut Surface) {
     for (iy, ix) in (0..part.height).flat_map(|iy| (0..part.width).map(move |ix| (iy, ix))) {
         let (x, y) = (part.origin[0] + ix as i32, part.origin[1] + iy as i32);
@@ -261,22 +263,22 @@ fn copy(part: &Surface, into: &mut Surface) {
     }
 }
 
-/// Both searches of one template side by side.
+/// Results of both searches for one template.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Comparison {
     /// The best match of the exhaustive search.
     pub exhaustive: Peak,
-    /// The best match coarse to fine.
+    /// The best match of the coarse-to-fine search.
     pub coarse_to_fine: Peak,
     /// Whether both found the same whole pixel.
     pub is_same: bool,
-    /// Positions that the exhaustive search compared.
+    /// Number of positions compared by the exhaustive search.
     pub exhaustive_comparisons: u64,
-    /// What the other saw.
+    /// Record of the coarse-to-fine search.
     pub search: CoarseSearch,
 }
 
-/// Runs both searches and tells where they differ (R65). `None` where either has nothing to compare.
+/// Runs both searches and compares their results (R65); `None` if either has no position to compare.
 pub fn compare(
     similarity: &Similarity,
     wide: &Patch,

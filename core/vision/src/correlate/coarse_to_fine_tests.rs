@@ -1,4 +1,4 @@
-//! Coarse to fine against the exhaustive search.
+//! The coarse-to-fine search compared with the exhaustive one.
 
 use image::Luma;
 use rand::{RngExt, SeedableRng};
@@ -10,7 +10,7 @@ use crate::image::sample::Kernel;
 
 const DESCENT: Descent = Descent { levels: 2, candidates: 5, reach_px: 2 };
 
-/// Noise smoothed to detail of about six pixels, and noise of the detector.
+/// Noise smoothed to detail of about six pixels, with detector noise.
 fn rough(seed: u64, width: u32, height: u32) -> GrayImage {
     let mut random = Pcg64::seed_from_u64(seed);
     let white = GrayImage::from_fn(width, height, |_, _| Luma([random.random::<f32>()]));

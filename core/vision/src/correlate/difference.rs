@@ -1,12 +1,12 @@
-//! Sums of differences: the measures that do not normalise (R216).
+//! Sums of differences: the measures without normalisation (R216).
 //!
 //! ```text
 //! sad = −(1/N) Σ |I − J|          ssd = −(1/N) Σ (I − J)²          larger = better, 0 = equal
 //! ```
-//! A change of brightness or contrast moves every score, so that no fixed limit can tell a match from a false one;
-//! who judges takes the normalised correlation at the place found. Sums run in `f32` over one row of the
-//! template, rows add up in `f64`: scores err by less than 1e-6 of themselves. A window with an invalid pixel sums to
-//! NaN and is excluded by that (R66).
+//! Scores depend on brightness and contrast, so that no fixed gate separates true from false matches; callers gate on
+//! the normalised correlation at the position found. Sums are in `f32` over one row of the template and in `f64` over
+//! rows: the relative error of a score is below 1e-6. A window with an invalid pixel sums to NaN, which excludes it
+//! (R66).
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -22,7 +22,7 @@ use crate::image::patch::Patch;
 use crate::image::{GrayImage, PixelRect};
 use sightline_geometry::cancel::Cancel;
 
-/// Mean absolute difference, negated, at every position of `region` that holds the template.
+/// Mean absolute difference, negated, at every position of `region` that contains the template.
 ///
 /// `None` as for [`super::zncc_surface`].
 pub(super) fn sad_surface(
@@ -34,7 +34,7 @@ pub(super) fn sad_surface(
     surface(template, image, region, cancel, f32::abs)
 }
 
-/// Mean squared difference, negated, at every position of `region` that holds the template.
+/// Mean squared difference, negated, at every position of `region` that contains the template.
 ///
 /// `None` as for [`super::zncc_surface`].
 pub(super) fn ssd_surface(

@@ -1,16 +1,15 @@
-//! A match refined through a Gaussian window, so that what lies near the target's point counts most (ours).
+//! Refines a match with a Gaussian window, so that pixels near the target's point have the largest weight (ours).
 //!
-//! A large template finds the target without ambiguity, but the surface it shows is not flat: relief of height h
-//! beside the point moves by `h Δθ` when the line of sight turns by Δθ, and pulls the match along. Relief grows
-//! with the distance from the point, about as its square on a curved surface, so that pixels far from the point
-//! do most harm. The highest score of the whole template is therefore followed uphill on scores in which each
-//! pixel counts with the weight
+//! A large template finds the target without ambiguity, but its surface is not flat: relief of height h beside the point
+//! moves by `h Δθ` when the line of sight rotates by Δθ, and biases the match. Relief grows with the distance from the
+//! point, about as its square on a curved surface, so that distant pixels have the largest bias. From the highest score
+//! of the whole template the refinement therefore climbs a score in which each pixel has the weight
 //! ```text
 //! w(r) = exp(−r² / 2σ²)                       r: distance from the template's centre
 //! ncc  = Σ w (I − Ī)(J − J̄) / sqrt(Σ w (I − Ī)² Σ w (J − J̄)²),   Ī = Σ w I / Σ w
 //! ```
-//! to the nearest maximum, which is fitted below the pixel as every peak is (`peak`). With σ = 0 all pixels count
-//! alike, and K-Eq 11 is left.
+//! to the nearest maximum, which is fitted to sub-pixel precision as every peak is (`peak`). With σ = 0 all pixels have
+//! the same weight, and the score is K-Eq 11.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -25,10 +24,10 @@ use super::peak::Fit;
 use crate::image::GrayImage;
 use crate::image::patch::{FLAT_STD, Patch};
 
-/// Steps uphill before the match is taken to have run away.
+/// Largest number of steps uphill before the match is rejected as divergent.
 const CLIMB_LIMIT: usize = 6;
 
-/// The weights of a square window's pixels.
+/// Weights of the pixels of a square window.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Focus {
     size: u32,
@@ -39,14 +38,14 @@ pub struct Focus {
 /// A maximum of the weighted scores.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FocusedPeak {
-    /// From where the climb began to the maximum, px.
+    /// From the start of the climb to the maximum, px.
     pub offset_px: Vector2<f64>,
-    /// The weighted score there.
+    /// Weighted score at the maximum.
     pub score: f64,
 }
 
 impl Focus {
-    /// A Gaussian of `sigma_px` over a window of `size` × `size` px; 0: all pixels alike.
+    /// A Gaussian of `sigma_px` over a window of `size` × `size` px; 0: uniform weights.
     pub fn new(size: u32, sigma_px: f64) -> Self {
         let half = (f64::from(size) - 1.0) / 2.0;
         let weight = |x: u32, y: u32| -> f64 {
@@ -59,7 +58,7 @@ impl Focus {
         Self { size, weights, is_even: sigma_px <= 0.0 }
     }
 
-    /// Whether all pixels count alike, so that there is nothing to refine.
+    /// Returns whether the weights are uniform, so that there is nothing to refine.
     pub fn is_even(&self) -> bool {
         self.is_even
     }
@@ -69,9 +68,10 @@ impl Focus {
         &self.weights
     }
 
-    /// The patch with weighted mean 0 and weighted deviation 1; invalid pixels stay so and do not count.
+    /// Returns the patch with weighted mean 0 and weighted standard deviation 1; invalid pixels stay invalid and have no
+    /// weight.
     ///
-    /// `None` when it has another size or no contrast.
+    /// `None` if it has another size or no contrast.
     pub fn normalise(&self, patch: &Patch) -> Option<Patch> {
         if patch.dimensions() != (self.size, self.size) {
             return None;
@@ -85,20 +85,20 @@ impl Focus {
         GrayImage::from_raw(self.size, self.size, values).map(Patch::from)
     }
 
-    /// The weighted score of two patches, of which the first is normalised; `None` for a flat or an incomplete one.
+    /// Weighted score of two patches, the first of which is normalised; `None` if either is unusable or flat.
     pub fn score(&self, normalised: &Patch, window: &Patch) -> Option<f64> {
         self.score_weighted(&self.weighted(normalised)?, window)
     }
 
-    /// `w t` of a normalised template; `None` when it has another size or an invalid pixel.
+    /// `w t` of a normalised template; `None` if it has another size or an invalid pixel.
     fn weighted(&self, normalised: &Patch) -> Option<Vec<f64>> {
         let is_usable = normalised.dimensions() == (self.size, self.size) && normalised.is_complete();
         is_usable
             .then(|| normalised.as_raw().iter().zip(&self.weights).map(|(t, w)| w * f64::from(*t)).collect())
     }
 
-    /// The score of a window against `weighted`, in one pass over values less the window's first, so that a small
-    /// contrast keeps its digits; columns are summed side by side, in an order that never changes.
+    /// Score of a window against `weighted`, in one pass over values minus the window's first, which preserves the
+    /// digits of a small contrast. Columns are summed side by side, in a fixed order.
     fn score_weighted(&self, weighted: &[f64], window: &Patch) -> Option<f64> {
         if window.dimensions() != (self.size, self.size) {
             return None;
@@ -122,16 +122,16 @@ impl Focus {
         }
         let [mean, squares, product, total] =
             [means, squares, products, totals].map(|columns| columns.iter().sum::<f64>());
-        // An invalid pixel leaves no finite sum, and so no score.
+        // An invalid pixel makes the sums non-finite: no score.
         let std = Some((squares - mean * mean).max(0.0).sqrt()).filter(|std| *std >= FLAT_STD)?;
         Some((product - mean * total) / std).filter(|score| score.is_finite())
     }
 
-    /// Climbs from offset (0, 0) over the weighted scores of windows at whole-pixel offsets to their next
-    /// maximum, which is fitted below the pixel where `sub_pixel` is set.
+    /// Climbs from offset (0, 0) over the weighted scores of windows at whole-pixel offsets to the nearest maximum,
+    /// which is fitted to sub-pixel precision if `sub_pixel` is set.
     ///
-    /// `window_at(x, y)` is the window moved by that many pixels. `None` when no maximum is met within six steps,
-    /// when it cannot be fitted (a straight edge has none across), or when a window beside it is flat or incomplete.
+    /// `window_at(x, y)` is the window moved by that many pixels. `None` if there is no maximum within six steps, if it
+    /// cannot be fitted (a straight edge has none along itself), or if a window beside it is flat or incomplete.
     pub fn climb(
         &self,
         template: &Patch,
@@ -148,7 +148,7 @@ impl Focus {
         let [mut x, mut y] = [0, 0];
         for _ in 0..CLIMB_LIMIT {
             let near: Matrix3<f64> = around([x, y], &mut score)?;
-            // Among equal scores the middle stands.
+            // Among equal scores the centre wins.
             let start = (near[(1, 1)], [0, 0]);
             let (_, step) = near.iter().enumerate().fold(start, |best, (index, &score)| {
                 if score > best.0 { (score, [index as i32 / 3 - 1, index as i32 % 3 - 1]) } else { best }
@@ -172,7 +172,7 @@ impl Focus {
     }
 }
 
-/// The N × N scores around a place, columns by x and rows by y; `None` where one is missing.
+/// The N × N scores around a position, columns by x and rows by y; `None` if one is missing.
 fn around<const N: usize>(
     [x, y]: [i32; 2],
     score: &mut impl FnMut(i32, i32) -> Option<f64>,

@@ -10,7 +10,7 @@ use sightline_geometry::frames::Pixel;
 
 const SIZE: u32 = 21;
 
-/// Waves of 7 to 19 px, so that a maximum lies within climbing distance.
+/// Waves of 7 to 19 px, so that a maximum is within climbing distance.
 fn texture(x: f64, y: f64) -> f32 {
     let waves = [(7.0, 0.3), (9.0, 1.9), (13.0, 3.1), (19.0, 4.6)];
     let wave = |(length, angle): (f64, f64)| {
@@ -19,7 +19,7 @@ fn texture(x: f64, y: f64) -> f32 {
     (0.5 + 0.08 * waves.map(wave).iter().sum::<f64>()) as f32
 }
 
-/// An image of the texture moved by (dx, dy) px; from `radius_px` about its middle on, by one pixel more in x.
+/// An image of the texture moved by (dx, dy) px; farther than `radius_px` from its centre by one pixel more in x.
 fn image(dx: f64, dy: f64, radius_px: f64) -> GrayImage {
     GrayImage::from_fn(61, 61, |x, y| {
         let (x, y) = (f64::from(x) - 30.0, f64::from(y) - 30.0);

@@ -1,4 +1,4 @@
-//! The positions of a square template whose whole window lies in a region and in the image.
+//! Positions of a square template whose whole window is inside a region and the image.
 
 use super::surface::Surface;
 use crate::image::{GrayImage, PixelRect};
@@ -6,7 +6,7 @@ use crate::image::{GrayImage, PixelRect};
 /// The positions, row by row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Grid {
-    /// The region, cut to the image.
+    /// The region, clipped to the image.
     pub(super) region: PixelRect,
     /// Positions per row.
     pub(super) width: u32,
@@ -17,7 +17,7 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// `None` when the template is not square, has an even side, or no position holds it.
+    /// `None` if the template is not square, has an even side, or fits at no position.
     pub(super) fn new(template: (u32, u32), image: &GrayImage, region: PixelRect) -> Option<Self> {
         let (size, height) = template;
         if height != size || size.is_multiple_of(2) {
@@ -29,7 +29,7 @@ impl Grid {
         Some(Self { region, width, height, size })
     }
 
-    /// How many positions there are.
+    /// Number of positions.
     pub(super) fn len(&self) -> usize {
         self.width as usize * self.height as usize
     }
@@ -40,7 +40,7 @@ impl Grid {
         [self.region.x + half, self.region.y + half]
     }
 
-    /// The scores of all positions as a surface.
+    /// The scores of all positions as a score map.
     pub(super) fn surface(&self, scores: Vec<f32>, flat_positions: u32) -> Surface {
         Surface {
             origin: self.origin(),

@@ -1,14 +1,15 @@
-//! Gradient descent on a window's place: Lucas & Kanade (1981), affine as Shi & Tomasi (1994) (R217, R218, R222).
+//! Gradient descent on the position of a window: Lucas & Kanade (1981), affine as Shi & Tomasi (1994) (R217, R218,
+//! R222).
 //!
-//! The template T is at rest; the image J is read through the map `x = c + A o`, o the offset from the template's
-//! middle. A step solves the least squares of the inverse compositional form (Baker & Matthews 2004),
+//! The template T is fixed; the image J is sampled through the map `x = c + A o`, o the offset from the template's
+//! centre. A step solves the least squares of the inverse compositional form (Baker & Matthews 2004),
 //! ```text
 //! min over δ, a, b   Σ ( T(o) + ∇T(o)·W(o) δ − a J(c + A o) − b )²        W = [1 | o_x 1 | o_y 1]
 //! A ← A (1 + D)⁻¹,   c ← c − A d                                           δ = (d, D)
 //! ```
-//! A translation solves for d alone and leaves A as it is. Where `photometric` is set, gain a and level b are solved
-//! together with the step, so that a change of light does not pull it; else a = 1 and b = 0, as in the papers
-//! of the two trackers. Steps end when the window's pixels move less than `stop_px`, or after `iterations`.
+//! A translation solves for d alone and leaves A unchanged. With `photometric`, gain a and bias b are solved for
+//! together with the step, so that a change of light does not bias it; otherwise a = 1 and b = 0, as in the papers of
+//! the two trackers. Steps end when the window's pixels move less than `stop_px`, or after `iterations`.
 //!
 //! From a pyramid's coarsest level down, each level starts where the last one ended.
 //!
@@ -27,10 +28,10 @@ use crate::image::pyramid;
 use crate::image::sample::Kernel;
 use sightline_geometry::frames::Pixel;
 
-/// Why a descent found no minimum.
+/// Reason why a descent found no minimum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DescentFailure {
-    /// The template is cut by the border of its image.
+    /// The template extends over the border of its image.
     #[error("the template reaches over the border of its image")]
     TemplateOutside,
     /// The normal equations are singular.
@@ -47,42 +48,42 @@ pub enum DescentFailure {
     RanAway,
 }
 
-/// Unknowns of a step: two of the shift, four of the map, gain and level.
+/// Unknowns of a step: two of the translation, four of the map, gain and bias.
 const UNKNOWNS: usize = 8;
 
-/// What is solved for, and when to stop.
+/// Unknowns and stopping rule of a descent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Descend {
-    /// Whether the map is solved for, or the shift alone.
+    /// Whether to solve for the map A in addition to the translation.
     pub affine: bool,
-    /// Whether gain and level are.
+    /// Whether to solve for gain and bias.
     pub photometric: bool,
-    /// Most steps at each level.
+    /// Largest number of steps at each level.
     pub iterations: u32,
     /// A step that moves the window's pixels by less ends the level, px.
     pub stop_px: f64,
 }
 
-/// Where a window lies in an image.
+/// Position and shape of a window in an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placed {
-    /// Where its middle lies, px.
+    /// Position of the centre, px.
     pub centre: Pixel,
-    /// How offsets from the middle map into the image, px per px.
+    /// Maps offsets from the centre into the image, px per px.
     pub map: Matrix2<f64>,
-    /// Steps taken, over all levels.
+    /// Number of steps, over all levels.
     pub iterations: u32,
-    /// Root mean square of what the last step left unexplained, fractions of full scale.
+    /// RMS difference of template and window at the last step, fractions of full scale.
     pub residual: f64,
 }
 
 impl Placed {
-    /// A window that is not turned or stretched, about a pixel.
+    /// A window without rotation or stretch, centred at a pixel.
     pub fn at(centre: Pixel) -> Self {
         Self { centre, map: Matrix2::identity(), iterations: 0, residual: 0.0 }
     }
 
-    /// The `size` × `size` window of `image` in this place, seen as the template is.
+    /// The `size` × `size` window of `image`, resampled to the template's frame.
     pub fn window(&self, image: &GrayImage, size: u32, kernel: Kernel) -> Patch {
         patch::resample_through(image, size, kernel, |o| {
             let moved = self.map * o;
@@ -91,10 +92,10 @@ impl Placed {
     }
 }
 
-/// The side of the template at a level.
+/// Side of the template at the levels of the pyramid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Footprint {
-    /// The same number of pixels at every level, so that coarse levels see more of the surroundings.
+    /// The same number of pixels at every level, so that coarse levels cover more of the surroundings.
     SamePixels(u32),
     /// The same part of the scene at every level.
     SameScene(u32),
@@ -108,20 +109,20 @@ impl Footprint {
         }
     }
 
-    /// Side of the patch that the levels need, its middle on a pixel of every level.
+    /// Side of the patch required by all levels, with its centre on a pixel of every level, px.
     pub fn wide_px(self, levels: usize) -> u32 {
         let coarsest = levels.saturating_sub(1);
-        // Two pixels for the weights of the pyramid and one for the gradient.
+        // Two pixels for the blur of the pyramid and one for the gradient.
         2 * ((self.size(coarsest) / 2 + 3) << coarsest) + 1
     }
 }
 
 /// Descends from `start` at the coarsest of `levels` to the finest.
 ///
-/// `wide` is the template with the surroundings of [`Footprint::wide_px`].
+/// `wide` is the template with surroundings of [`Footprint::wide_px`].
 ///
 /// # Errors
-/// [`DescentFailure`]: no contrast, a window outside the image, or steps that run away.
+/// [`DescentFailure`]: no contrast, a window outside the image, or divergence.
 pub fn descend(
     wide: &Patch,
     footprint: Footprint,
@@ -145,7 +146,7 @@ pub fn descend(
                 place =
                     Placed { centre: Pixel::new(found.centre.x * scale, found.centre.y * scale), ..found };
             }
-            // A coarse level only brings the start nearer: near a border there is one fewer.
+            // A coarse level only improves the start: near a border there may be one level fewer.
             Err(_) if level > 0 => {}
             Err(missing) => return Err(missing),
         }
@@ -153,7 +154,7 @@ pub fn descend(
     Ok(place)
 }
 
-/// The steps of one level; the rim of `template` serves its gradients alone.
+/// Runs the steps of one level; the rim of `template` is used for its gradients only.
 fn solve(
     template: &Patch,
     image: &GrayImage,
@@ -177,7 +178,7 @@ fn solve(
             let g = [gx.get_pixel(x + 1, y + 1)[0], gy.get_pixel(x + 1, y + 1)[0]].map(f64::from);
             let (t, j) = (f64::from(template.get_pixel(x + 1, y + 1)[0]), f64::from(pixel[0]));
             let row = SVector::from([g[0], g[1], g[0] * o.x, g[1] * o.x, g[0] * o.y, g[1] * o.y, -j, -1.0]);
-            // With gain 1 and level 0 the image stands on the right-hand side.
+            // With gain 1 and bias 0 the image is on the right-hand side.
             let value = if options.photometric { -t } else { j - t };
             normal += row * row.transpose();
             right += row * value;
@@ -203,7 +204,7 @@ fn solve(
     Ok(place)
 }
 
-/// Solves the normal equations for what the options ask; the rest is zero.
+/// Solves the normal equations for the selected unknowns; the others are zero.
 fn step(
     mut normal: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
     mut right: SVector<f64, UNKNOWNS>,
@@ -220,7 +221,7 @@ fn step(
         normal[(index, index)] = 1.0;
         right[index] = 0.0;
     }
-    // Unknowns of pixels and of pixels per pixel differ by orders of magnitude: each is scaled to one.
+    // Unknowns in px and in px per px differ by orders of magnitude: each is scaled to 1.
     let scale = normal.diagonal().map(|d| if d > 1e-12 { 1.0 / d.sqrt() } else { 0.0 });
     if scale.iter().any(|s| *s == 0.0) {
         return None;

@@ -1,4 +1,4 @@
-//! Descents over images moved by known maps, beside what OpenCV finds (`tests/reference/measures_reference.py`).
+//! Descents over images with known maps, compared with OpenCV (`tests/reference/measures_reference.py`).
 
 use super::*;
 use crate::testing::{reference_image, reference_numbers};
@@ -26,7 +26,7 @@ fn a_translation_is_found_as_by_opencv_and_as_it_was() {
         let truth = CENTRE.offset(moved[0], moved[1]);
         assert!(found.centre.distance(truth) < 0.02, "{moved:?}: {:?} for {truth:?}", found.centre);
         let theirs = Pixel::new(opencv[0], opencv[1]);
-        // OpenCV reads 8-bit pixels and stops at the same 0.01 px.
+        // OpenCV uses 8-bit pixels and stops at the same 0.01 px.
         assert!(found.centre.distance(theirs) < 0.03, "{moved:?}: {:?}, OpenCV {theirs:?}", found.centre);
         assert_eq!(found.map, Matrix2::identity());
     }
@@ -62,7 +62,7 @@ fn an_affine_map_under_another_light_is_found_nearer_than_opencv_finds_it() {
     let (theirs, place) = (numbers(&document["affine"]["found_map"]), numbers(&document["affine"]["found"]));
     let (their_map, their_place) =
         (Matrix2::new(theirs[0], theirs[1], theirs[2], theirs[3]), Pixel::new(place[0], place[1]));
-    // OpenCV reads the image bilinearly.
+    // OpenCV samples the image bilinearly.
     assert!((found.map - their_map).norm() < 0.006 && found.centre.distance(their_place) < 0.015);
     assert!(found.centre.distance(truth) < their_place.distance(truth));
     assert!((found.map - map).norm() < (their_map - map).norm());

@@ -1,20 +1,21 @@
-//! Normalised cross-correlation and its peaks (K§4.3.2, R62–R69).
+//! Similarity measures of a template and an image, their score maps and peaks (K§4.3.2, R62–R69).
 //!
 //! ```text
 //! ncc = Σ(I − Ī)(J − J̄) / sqrt(Σ(I − Ī)² Σ(J − J̄)²)                                             K-Eq 11
 //! ```
-//! | file | what it does |
+//! | file | contents |
 //! |---|---|
-//! | `zncc` | the dense surface of scores of one template over a region, and one score of two patches |
-//! | `surface` | the scores and which pixel each belongs to |
-//! | `toom_cook/` | the SIMD kernel behind `zncc`: numerators, sums of windows, scores; its README explains it |
-//! | `difference` | the surface of sums of absolute or squared differences |
-//! | `sdog` | the surface of agreeing signs of a difference of Gaussians |
-//! | `similarity` | these measures behind one name |
-//! | `coarse_to_fine` | the search that does not compare every position |
-//! | `lucas_kanade` | descent along the gradient, by shift or by affine map |
-//! | `peak` | the best match below the pixel, its covariance, and the second best |
-//! | `focus` | a match refined through a Gaussian window, which counts its centre most |
+//! | `zncc` | score map of one template over a region, and the score of two patches |
+//! | `surface` | a score map, and the pixel of each score |
+//! | `toom_cook/` | the SIMD kernel behind `zncc`: numerators, sums of windows, scores; explained in its README |
+//! | `difference` | score maps of sums of absolute or squared differences |
+//! | `sdog` | score map of agreeing signs of a difference of Gaussians |
+//! | `similarity` | the choice between these measures |
+//! | `coarse_to_fine` | non-exhaustive search |
+//! | `lucas_kanade` | gradient descent, by translation or by affine map |
+//! | `peak` | the best match at sub-pixel precision, its covariance, and the second best |
+//! | `focus` | refinement of a match with a Gaussian window |
+//! | `pseudo` | score map of the pseudo-normalised cross-correlation |
 
 pub mod zncc;
 pub mod surface;

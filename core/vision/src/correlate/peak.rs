@@ -1,30 +1,30 @@
-//! The best match of a surface below the pixel, its covariance, and the second best (R63, R67, R68).
+//! The best match of a score map at sub-pixel precision, its covariance, and the second best (R63, R67, R68).
 //!
 //! **Sub-pixel fit (R67).** Around the highest score a quadratic is fitted to the 3 × 3 neighbours,
 //! ```text
 //! f(d) = f₀ + gᵀ d + ½ dᵀ H d,     d* = −H⁻¹ g,     score = f(d*)
 //! ```
-//! with g and H by central differences, so that f passes through the highest score and its four neighbours. The
-//! whole pixel stands when H is not negative definite, or when a neighbour is missing or excluded; each
-//! component of d* is held within ±1 px.
+//! with g and H by central differences, so that f passes through the highest score and its four neighbours. The whole
+//! pixel is returned if H is not negative definite, or if a neighbour is missing or excluded; each component of d* is
+//! clamped to ±1 px.
 //!
-//! *Departure.* Where the 5 × 5 neighbours exist, d* is then moved to the maximum of the polynomial of fourth
-//! degree in x and in y that passes through all of them (Newton's method from d*). The surface is lopsided, because
-//! the norm of the window changes as it moves, and a quadratic cannot follow: with 21 × 21 pixels of noiseless
-//! texture of 5 to 20 px it errs by 0.03 px (rms; up to 0.08), the quartic by 0.01 (up to 0.03).
+//! *Departure.* If the 5 × 5 neighbours exist, d* is then moved to the maximum of the polynomial of fourth degree in x
+//! and in y that passes through all of them (Newton's method from d*). The score map is asymmetric, because the norm of
+//! the window changes as it moves, and a quadratic cannot follow: with 21 × 21 pixels of noiseless texture of 5 to 20 px
+//! its error is 0.03 px (RMS; up to 0.08), that of the quartic 0.01 (up to 0.03).
 //!
-//! **Covariance.** With patches of zero mean and unit norm a shift by δ lowers the score by ½ δᵀ(−H)δ, so −H is
-//! the information of the squared difference per unit of its variance. What the match leaves unexplained,
-//! 1 − ncc², is spread over the N pixels of the window less the four numbers fitted (gain, level, two shifts):
+//! **Covariance.** With patches of zero mean and unit norm a shift by δ lowers the score by ½ δᵀ(−H)δ, so −H is the
+//! information of the squared difference per unit of its variance. The unexplained part of the match, 1 − ncc², is
+//! divided by the N pixels of the window less the four fitted parameters (gain, bias, two shifts):
 //! ```text
 //! σ² = (1 − ncc²) / (N − 4),     Σ = σ² (−H)⁻¹ + floor² 1
 //! ```
-//! It is the Cramér–Rao bound for noise that is independent from pixel to pixel. It does not hold the bias of the
-//! correlation itself, which noise draws towards windows of more contrast (0.02 px at a score of 0.97 and 0.13 px
-//! at 0.84 in one simulated texture). Where the residual is correlated
-//! over an area of A px² (perspective, shadow) the effective count is N/A and Σ is A times larger: who needs that
-//! measures it from the patches. The floor is the error of the fit itself. A peak kept on whole pixels adds
-//! the variance of rounding, 1/12 px²; without a fit the position is known to the neighbours, 3 px wide: 3²/12.
+//! This is the Cramér–Rao bound for noise that is independent between pixels. It excludes the bias of the correlation
+//! itself, which noise moves towards windows of more contrast (0.02 px at a score of 0.97 and 0.13 px at 0.84 in one
+//! simulated texture). If the residual is correlated over an area of A px² (perspective, shadow), the effective count is
+//! N/A and Σ is A times larger; A must be measured from the patches. The floor is the error of the fit itself. A peak at
+//! a whole pixel adds the variance of rounding, 1/12 px²; without a fit the position is known to the neighbours only, 3
+//! px wide: 3²/12.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -43,12 +43,12 @@ use sightline_geometry::frames::Pixel;
 /// 1σ error of the fit itself on textures with detail down to three pixels, px.
 const FIT_FLOOR_PX: f64 = 0.02;
 
-/// The best match of a surface.
+/// The best match of a score map.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Peak {
-    /// Where the template's centre lies, px; below the pixel when that was asked for and could be fitted.
+    /// Position of the template's centre, px; sub-pixel if requested and if the fit succeeded.
     pub pixel: Pixel,
-    /// Score at `pixel`: of the fitted quadratic, or of the whole pixel.
+    /// Score at `pixel`: of the fitted function, or of the whole pixel.
     pub score: f64,
     /// The whole pixel with the highest score: column, row.
     pub integer: [i32; 2],
@@ -61,29 +61,28 @@ pub struct Peak {
     pub at_edge: bool,
 }
 
-/// The highest local maximum away from the best: how near the match was to another.
+/// The highest local maximum away from the best; measures the ambiguity of the match.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct SecondPeak {
-    /// Where the template's centre lies, whole px.
+    /// Position of the template's centre, whole px.
     pub pixel: Pixel,
-    /// Its score.
+    /// Score at `pixel`.
     pub score: f64,
-    /// Its score over the best whole-pixel score, or the inverse where scores are negative: near 1 the match is
-    /// ambiguous.
+    /// Score over the best whole-pixel score, or the inverse if the best is not positive: near 1 the match is ambiguous.
     pub ratio: f64,
     /// Distance from the best match, px.
     pub distance_px: f64,
 }
 
-/// The highest score of `surface`, refined below the pixel when `sub_pixel` is set.
+/// Finds the highest score of `surface`, with a sub-pixel fit if `sub_pixel` is set.
 ///
-/// `None` when every position is excluded. Among equal scores the first in reading order is taken.
+/// `None` if every position is excluded. Among equal scores the first in reading order is taken.
 pub fn find_peak(surface: &Surface, sub_pixel: bool) -> Option<Peak> {
     let (ix, iy, _) = surface.maximum()?;
     peak_at(surface, ix, iy, sub_pixel)
 }
 
-/// The match at an index of the surface, fitted below the pixel as the best one is.
+/// The match at an index of the score map, with the same sub-pixel fit as the best one.
 pub fn peak_at(surface: &Surface, ix: u32, iy: u32, sub_pixel: bool) -> Option<Peak> {
     let highest = surface.at(ix, iy)?;
     let whole = surface.pixel_of(ix, iy);
@@ -113,7 +112,7 @@ pub fn peak_at(surface: &Surface, ix: u32, iy: u32, sub_pixel: bool) -> Option<P
     })
 }
 
-/// The highest local maximum at least `min_distance_px` from the best match (R68); `None` when there is none.
+/// The highest local maximum at least `min_distance_px` from the best match (R68); `None` without one.
 pub fn second_peak(surface: &Surface, best: &Peak, min_distance_px: f64) -> Option<SecondPeak> {
     let mut second: Option<SecondPeak> = None;
     for (iy, ix) in (0..surface.height).flat_map(|iy| (0..surface.width).map(move |ix| (iy, ix))) {
@@ -128,7 +127,7 @@ pub fn second_peak(surface: &Surface, best: &Peak, min_distance_px: f64) -> Opti
     second
 }
 
-/// The highest local maxima: places in px of the surface's level, and scores.
+/// The highest local maxima: positions in px of the map's level, and scores.
 pub fn highest_maxima(surface: &Surface, count: usize) -> Vec<([i32; 2], f32)> {
     let places = (0..surface.height).flat_map(|iy| (0..surface.width).map(move |ix| (ix, iy)));
     let mut maxima: Vec<([i32; 2], f32)> = places
@@ -144,7 +143,7 @@ pub fn highest_maxima(surface: &Surface, count: usize) -> Vec<([i32; 2], f32)> {
     maxima
 }
 
-/// The lesser of two scores over the larger, so that it grows with their likeness whatever their sign.
+/// Ratio of the second score to the best, or its inverse if the best is not positive; 1 for equal scores.
 fn ratio(second: f64, best: f64) -> f64 {
     if second == best {
         1.0
@@ -155,7 +154,7 @@ fn ratio(second: f64, best: f64) -> f64 {
     }
 }
 
-/// Whether no neighbour is higher; of a plateau of two or more the first in reading order counts.
+/// Returns whether no neighbour is higher; of a plateau the first position in reading order counts.
 fn is_local_maximum(surface: &Surface, ix: u32, iy: u32) -> bool {
     let Some(here) = surface.at(ix, iy) else { return false };
     let columns = || ix.saturating_sub(1)..=ix + 1;
@@ -165,7 +164,7 @@ fn is_local_maximum(surface: &Surface, ix: u32, iy: u32) -> bool {
     })
 }
 
-/// The N × N scores around an index, indexed by (row, column); `None` when one is missing or excluded.
+/// The N × N scores around an index, indexed by (row, column); `None` if one is missing or excluded.
 fn neighbours<const N: usize>(surface: &Surface, ix: u32, iy: u32) -> Option<SMatrix<f64, N, N>> {
     let mut scores = SMatrix::zeros();
     for (row, column) in (0..N).flat_map(|row| (0..N).map(move |column| (row, column))) {
@@ -181,9 +180,9 @@ fn neighbours<const N: usize>(surface: &Surface, ix: u32, iy: u32) -> Option<SMa
 pub struct Fit {
     /// From the whole pixel to the maximum, px.
     pub offset: Vector2<f64>,
-    /// Value there.
+    /// Value at the maximum.
     pub score: f64,
-    /// Curvature there, 1/px²; negative definite.
+    /// Curvature at the maximum, 1/px²; negative definite.
     hessian: Matrix2<f64>,
 }
 
@@ -203,8 +202,8 @@ impl Fit {
         Some(Self { offset, score, hessian })
     }
 
-    /// The maximum of the polynomial through 5 × 5 scores nearest to this fit; `None` when Newton's method does
-    /// not settle within a pixel of the highest score.
+    /// The maximum, nearest to this fit, of the polynomial through 5 × 5 scores; `None` if Newton's method does not
+    /// converge within a pixel of the highest score.
     pub fn refined(&self, f: &SMatrix<f64, 5, 5>) -> Option<Self> {
         let coefficients = QUARTIC * f * QUARTIC.transpose();
         let mut offset = self.offset;
@@ -226,7 +225,7 @@ impl Fit {
         None
     }
 
-    /// Covariance of the maximum of a template of `samples` pixels that scores `score`, px².
+    /// Covariance of the maximum for a template of `samples` pixels with score `score`, px².
     fn covariance(&self, score: f64, samples: f64) -> Matrix2<f64> {
         let variance = (1.0 - score * score).max(0.0) / (samples - 4.0).max(1.0);
         let information = (-self.hessian).try_inverse().unwrap_or_else(Matrix2::identity);
@@ -234,7 +233,7 @@ impl Fit {
     }
 }
 
-/// Newton's method doubles its digits at every step; from a quadratic's answer four suffice.
+/// Limit of Newton's method; its convergence is quadratic, and from a quadratic's maximum four steps suffice.
 const NEWTON_STEPS: usize = 12;
 
 /// Coefficients of 1, d, d², d³, d⁴ of the quartic through values at d = −2 … 2.
@@ -257,7 +256,7 @@ fn powers(d: f64) -> [Vector5<f64>; 3] {
     ]
 }
 
-/// Whether the curvature is negative in every direction, by more than the rounding of `f32` scores.
+/// Returns whether the curvature is negative in every direction, by more than the rounding of `f32` scores.
 fn is_maximum(hessian: &Matrix2<f64>) -> bool {
     hessian.m11 < 0.0 && hessian.m22 < 0.0 && hessian.determinant() > 1e-12
 }

@@ -1,4 +1,4 @@
-//! Tests of the sub-pixel peak, its covariance, the second peak, and of finding scaled and rolled templates.
+//! Tests of the sub-pixel peak, its covariance, the second peak, and of matching scaled and rolled templates.
 
 use image::Luma;
 use rand::SeedableRng;
@@ -58,7 +58,7 @@ fn ncc_finds_a_template_rolled_by_ten_degrees_and_scaled_forward_and_back() {
     for (scale, roll_deg) in [(1.0, 10.0), (1.0, -10.0), (1.25, 0.0), (0.8, 0.0), (1.25, -10.0), (0.8, 10.0)]
     {
         let (sin, cos) = f64::to_radians(roll_deg).sin_cos();
-        // The new image: the texture magnified and turned clockwise about the centre, then moved by (4.3, −2.6).
+        // The new image: the texture magnified and rotated clockwise about the centre, then moved by (4.3, −2.6).
         let target = centre.offset(4.3, -2.6);
         let after = image_of(105, |x, y| {
             let (u, v) = ((x - target.x) / scale, (y - target.y) / scale);
@@ -114,7 +114,7 @@ fn on_a_ridge_at_the_edge_or_beside_an_excluded_position_the_whole_pixel_stands(
 
 #[test]
 fn the_covariance_is_that_of_many_noisy_matches() {
-    // Independent noise in the image: the spread of the peak must be what each match says of itself.
+    // Independent noise in the image: the scatter of the peak must equal the predicted covariance.
     let centre = Pixel::new(30.0, 30.0);
     let clean = image_of(60, |x, y| texture(x - 0.3, y + 0.2));
     let template = extract(&image_of(60, texture), centre, 10, Kernel::Bicubic);
@@ -131,7 +131,7 @@ fn the_covariance_is_that_of_many_noisy_matches() {
     let mean = peaks.iter().sum::<Vector2<f64>>() / f64::from(runs);
     let spread: Matrix2<f64> =
         peaks.iter().map(|p| (p - mean) * (p - mean).transpose()).sum::<Matrix2<f64>>() / f64::from(runs);
-    // Noise does not change with the window but its contrast does, which draws the peak a little towards contrast.
+    // The contrast of the window depends on its position, which biases the peak a little towards contrast.
     assert!((mean - Vector2::new(30.3, 29.8)).norm() < 0.05, "{mean}");
     for i in 0..2 {
         let ratio = spread[(i, i)] / predicted[(i, i)];
@@ -153,7 +153,7 @@ fn the_second_peak_is_the_highest_local_maximum_far_enough_away() {
     assert_eq!(far.pixel, Pixel::new(150.0, 230.0));
     assert!((far.score - 0.6).abs() < 1e-3 && (far.ratio - far.score / best.integer_score).abs() < 1e-12);
     assert!((far.distance_px - 30.0_f64.hypot(10.0)).abs() < 0.05);
-    // A slope that only enters the allowed distance is no maximum, and one bump has no second.
+    // A slope that reaches into the allowed distance is no maximum, and a single bump has no second.
     let single = surface_of(30, 30, |x, y| -(x - 15.0).abs() - (y - 15.0).abs());
     assert!(second_peak(&single, &find_peak(&single, false).unwrap(), 5.0).is_none());
 }

@@ -1,10 +1,10 @@
-//! Pseudo-normalised cross-correlation (Moravec 1980), as the visual odometry of the Mars Exploration Rovers has it.
+//! Pseudo-normalised cross-correlation (Moravec 1980), as in the visual odometry of the Mars Exploration Rovers.
 //!
 //! ```text
-//! pnc = 2 Σ t j / (Σ t² + Σ j²)        t, j: template and window, each less its mean
+//! pnc = 2 Σ t j / (Σ t² + Σ j²)        t, j: template and window, each minus its mean
 //! ```
-//! It is at most the normalised correlation, and equal to it where both have the same contrast. Two windows without contrast
-//! score 0. Sums are in `f64`, position by position: twenty times the time of `zncc`.
+//! Its magnitude is at most that of the normalised correlation, and equal for equal contrast. Two windows without
+//! contrast score 0. Sums are in `f64`, position by position: twenty times the time of `zncc`.
 //!
 //! Source: domain.md 9.2.
 
@@ -14,10 +14,10 @@ use crate::image::{GrayImage, Patch, PixelRect};
 /// Least mean square of template and window together that counts as contrast, (fraction of full scale)².
 const FLAT: f64 = 1e-12;
 
-/// Scores of a square template with an odd side at every position whose window lies in `region` and in the image.
+/// Scores of a square template with an odd side at every position whose window is inside `region` and the image.
 ///
-/// `None` when the template is not square, has an even side or an invalid pixel, or when no position holds it. A position
-/// whose window touches an invalid pixel is excluded.
+/// `None` if the template is not square, has an even side or an invalid pixel, or fits at no position. A position whose
+/// window touches an invalid pixel is excluded.
 pub fn pseudo_surface(template: &Patch, image: &GrayImage, region: PixelRect) -> Option<Surface> {
     let size = template.width();
     if template.height() != size || size.is_multiple_of(2) || !template.is_complete() {
@@ -46,7 +46,7 @@ pub fn pseudo_surface(template: &Patch, image: &GrayImage, region: PixelRect) ->
             }
         }
         let other = (squares - sum * sum / count).max(0.0);
-        // The template has no mean, so that the window's does not matter to the product. Invalid pixels are not numbers.
+        // The template has zero mean, so that the window's does not affect the product. Invalid pixels are NaN.
         let is_flat = own + other < FLAT * count;
         flat_positions += u32::from(is_flat);
         scores.push(if is_flat { 0.0 } else { (2.0 * product / (own + other)) as f32 });

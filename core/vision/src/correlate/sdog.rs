@@ -1,16 +1,16 @@
 //! Sign of the difference of Gaussians: the tracker of Marsokhod (R219).
 //!
 //! ```text
-//! b(x) = [ (G(σ₁) * I − G(σ₂) * I)(x) ≥ 0 ],   σ₂ = k σ₁         one bit a pixel
-//! score = 2 · (share of pixels whose bits agree) − 1             −1 to 1
+//! b(x) = [ (G(σ₁) * I − G(σ₂) * I)(x) ≥ 0 ],   σ₂ = k σ₁         one bit per pixel
+//! score = 2 · (fraction of pixels whose bits agree) − 1          −1 to 1
 //! ```
-//! The bits are the sign of a band-pass: gain and level of the light drop out, and what remains is where the image
-//! is brighter or darker than its surroundings. Rows of bits are packed into words of 64, so that a row of the
-//! template is compared by one exclusive or and one count.
+//! The bits are the sign of a band-pass: they are invariant to gain and bias, and encode where the image is brighter or
+//! darker than its surroundings. Rows of bits are packed into words of 64, so that a row of the template is compared by
+//! one exclusive or and one population count.
 //!
-//! The template's bits need its surroundings up to 3σ₂ beyond its border; where the patch that is given holds less, the
-//! Gaussians are normalised over what there is, as at the border of an image. A window that touches an invalid
-//! pixel is excluded (R66).
+//! The template's bits need its surroundings up to 3σ₂ beyond its border; if the given patch is smaller, the Gaussians
+//! are normalised over the available pixels, as at the border of an image. A window that touches an invalid pixel is
+//! excluded (R66).
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -31,17 +31,17 @@ use sightline_geometry::cancel::Cancel;
 pub struct Sdog {
     /// Standard deviation of the narrower, px.
     pub sigma_px: f64,
-    /// How much wider the other is.
+    /// Ratio of the wider standard deviation to the narrower.
     pub ratio: f64,
 }
 
 impl Sdog {
-    /// How far the wider Gaussian reaches, px.
+    /// Reach of the wider Gaussian (3σ₂), px.
     pub fn margin_px(&self) -> u32 {
         (3.0 * self.sigma_px * self.ratio.max(1.0)).ceil() as u32
     }
 
-    /// Scores at every position of `region` that holds the template: the middle `size` × `size` px of `wide`.
+    /// Scores at every position of `region` that contains the template: the middle `size` × `size` px of `wide`.
     ///
     /// `None` as for [`super::zncc_surface`].
     pub(super) fn surface(
@@ -76,7 +76,7 @@ impl Sdog {
         Some(grid.surface(scores, 0))
     }
 
-    /// The difference of Gaussians over `part`; pixels around it take part where the image has them.
+    /// The difference of Gaussians over `part`; uses the image's pixels around it.
     fn band(&self, image: &GrayImage, part: &PixelRect) -> Option<GrayImage> {
         let margin = self.margin_px() as i32;
         let wide = PixelRect::new(
@@ -96,11 +96,11 @@ impl Sdog {
     }
 }
 
-/// Signs of an image, and which of its pixels are valid, row by row in words of 64.
+/// Signs and validity of an image's pixels, row by row in words of 64.
 struct Bits {
     width: usize,
     height: usize,
-    /// Words per row, one more than the pixels need, so that a word may be read across the last.
+    /// Words per row: one more than the pixels need, so that a read may extend past the last.
     words: usize,
     signs: Vec<u64>,
     valid: Vec<u64>,
@@ -124,7 +124,7 @@ impl Bits {
         bits
     }
 
-    /// `length` bits (at most 64) of a row from column `x`.
+    /// Reads `length` bits (at most 64) of a row from column `x`.
     fn read(&self, plane: &[u64], x: usize, y: usize, length: usize) -> u64 {
         let (word, shift) = (y * self.words + x / 64, x % 64);
         let low = plane[word] >> shift;
@@ -132,7 +132,7 @@ impl Bits {
         (low | high) & (u64::MAX >> (64 - length))
     }
 
-    /// The pieces of at most 64 columns into which a row of `width` falls: start and length.
+    /// Splits a row of `width` into pieces of at most 64 columns: start and length.
     fn pieces(width: usize) -> impl Iterator<Item = (usize, usize)> {
         (0..width).step_by(64).map(move |start| (start, (width - start).min(64)))
     }
@@ -142,7 +142,7 @@ impl Bits {
         valid as usize == self.width * self.height
     }
 
-    /// Whether the window of `size` × `size` px at (x, y) holds valid pixels only.
+    /// Returns whether all pixels of the window of `size` × `size` px at (x, y) are valid.
     fn is_valid(&self, x: usize, y: usize, size: usize) -> bool {
         (0..size).all(|row| {
             Self::pieces(size).all(|(start, length)| {
@@ -151,7 +151,7 @@ impl Bits {
         })
     }
 
-    /// How many bits of this template agree with the window at (x, y) of `image`.
+    /// Number of this template's bits that agree with the window at (x, y) of `image`.
     fn agreement(&self, image: &Self, x: usize, y: usize) -> u32 {
         let mut differing = 0;
         for row in 0..self.height {

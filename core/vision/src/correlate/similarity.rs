@@ -1,11 +1,11 @@
-//! The four measures by which a template and an image are compared (R216, R219), behind one name.
+//! The four similarity measures of a template and an image (R216, R219).
 //!
-//! | measure | score | sees a change of light as |
+//! | measure | score | effect of gain and bias |
 //! |---|---|---|
-//! | `ncc` | −1 to 1 | nothing (R69) |
-//! | `sad` | −1 to 0 | a difference |
-//! | `ssd` | −1 to 0 | a difference |
-//! | `sdog` | −1 to 1 | nothing |
+//! | `ncc` | −1 to 1 | none (R69) |
+//! | `sad` | −1 to 0 | lowers the score |
+//! | `ssd` | −1 to 0 | lowers the score |
+//! | `sdog` | −1 to 1 | none |
 //!
 //! Larger is better for all of them.
 
@@ -17,7 +17,7 @@ use crate::image::patch::{self, Patch};
 use crate::image::{GrayImage, PixelRect};
 use sightline_geometry::cancel::Cancel;
 
-/// A measure of likeness.
+/// A similarity measure.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Similarity {
     /// Normalised cross-correlation.
@@ -32,7 +32,7 @@ pub enum Similarity {
 }
 
 impl Similarity {
-    /// How far around the template its surroundings are looked at, px.
+    /// Width of the surroundings that the measure needs around the template, px.
     pub fn margin_px(&self) -> u32 {
         match self {
             Self::Sdog(sdog) => sdog.margin_px(),
@@ -40,15 +40,15 @@ impl Similarity {
         }
     }
 
-    /// Scores at every position of `region` that holds the template: the middle `size` × `size` px of `wide`.
+    /// Scores at every position of `region` that contains the template: the middle `size` × `size` px of `wide`.
     ///
-    /// `None` when `size` is even or larger than `wide`, when the template has an invalid pixel, or when no
-    /// position holds it.
+    /// `None` if `size` is even or larger than `wide`, if the template has an invalid pixel, or if it fits at no
+    /// position.
     pub fn surface(&self, wide: &Patch, size: u32, image: &GrayImage, region: PixelRect) -> Option<Surface> {
         self.surface_until(wide, size, image, region, Cancel::default())
     }
 
-    /// The same; soon after `cancel` is requested, returns a surface whose scores mean nothing.
+    /// As [`Self::surface`]; soon after `cancel` is requested, returns a map with meaningless scores.
     pub fn surface_until(
         &self,
         wide: &Patch,

@@ -1,4 +1,5 @@
-//! The other measures against OpenCV and SciPy (`tests/reference/measures_reference.py`), and what light does to each.
+//! The other measures against OpenCV and SciPy (`tests/reference/measures_reference.py`), and the effect of gain and
+//! bias.
 
 use image::Luma;
 use serde_json::Value;
@@ -40,7 +41,7 @@ fn signs_of_the_difference_of_gaussians_agree_as_scipy_counts_them() {
     assert!(largest_difference(SDOG, "sdog") < 1e-7);
 }
 
-/// Where the best score of the window about (40, 33) lies in the image moved by (3, −2), brighter and with a slope.
+/// Best position of the window about (40, 33) in the image moved by (3, −2), with other gain and bias and a slope.
 fn found(similarity: Similarity, gain: f64, level: f64) -> Pixel {
     let wide =
         extract(&reference_image(|x, y| (x, y), 1.0, 0.0), Pixel::new(40.0, 33.0), 20, Kernel::Bicubic);

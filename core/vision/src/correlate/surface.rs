@@ -1,7 +1,7 @@
-//! The dense surface of scores of one template over a search region (R63).
+//! The score map of one template over a search region (R63).
 //!
-//! A score belongs to the pixel on which the *centre* of the template lies. A position whose window touches an
-//! invalid pixel is excluded (R66): its score is NaN.
+//! A score belongs to the pixel at the *centre* of the template. A position whose window touches an invalid pixel is
+//! excluded (R66): its score is NaN.
 
 use crate::image::GrayImage;
 use sightline_geometry::frames::Pixel;
@@ -17,14 +17,14 @@ pub struct Surface {
     pub height: u32,
     /// Scores, row by row; NaN = position excluded.
     pub scores: Vec<f32>,
-    /// Positions without contrast, of the window or of the template; they score 0 (R66).
+    /// Number of positions without contrast, of the window or of the template; they score 0 (R66).
     pub flat_positions: u32,
     /// Side of the template, px.
     pub template_size: u32,
 }
 
 impl Surface {
-    /// The score at index (`ix`, `iy`); `None` beyond the surface or where the position is excluded.
+    /// The score at index (`ix`, `iy`); `None` outside the map or if the position is excluded.
     pub fn at(&self, ix: u32, iy: u32) -> Option<f32> {
         if ix >= self.width || iy >= self.height {
             return None;
@@ -38,7 +38,7 @@ impl Surface {
         Pixel::new(f64::from(self.origin[0]) + f64::from(ix), f64::from(self.origin[1]) + f64::from(iy))
     }
 
-    /// The index whose template centre is the pixel (`x`, `y`); `None` beyond the surface.
+    /// The index whose template centre is the pixel (`x`, `y`); `None` outside the map.
     pub fn index_of(&self, x: i32, y: i32) -> Option<(u32, u32)> {
         let index = |v: i32, origin: i32, length: u32| {
             u32::try_from(i64::from(v) - i64::from(origin)).ok().filter(|i| *i < length)
@@ -57,12 +57,12 @@ impl Surface {
         best.map(|(i, score)| ((i % self.width as usize) as u32, (i / self.width as usize) as u32, score))
     }
 
-    /// Number of positions that were compared.
+    /// Number of positions that are not excluded.
     pub fn valid_positions(&self) -> usize {
         self.scores.iter().filter(|s| !s.is_nan()).count()
     }
 
-    /// The scores as an image, for display and export; `None` when width, height and scores disagree.
+    /// The scores as an image, for display and export; `None` if width, height and scores disagree.
     pub fn to_image(&self) -> Option<GrayImage> {
         GrayImage::from_raw(self.width, self.height, self.scores.clone())
     }

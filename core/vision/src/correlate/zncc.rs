@@ -3,17 +3,17 @@
 //! ```text
 //! ncc = Σ t j' / sqrt(Σ j'² − (Σ j')²/N)      t: template, zero mean and unit norm;  j': shifted window
 //! ```
-//! Because t has zero mean, the shift of the window is free; it is about the mean of the pixels near, and everything is
-//! summed in `f32`: numerators by `toom_cook`, Σ j' and Σ j'² by `moments`. What the rounded template lacks of zero mean
-//! is put right afterwards. Where a window is so flat, or so far from that mean, that these sums would lose digits, the
-//! position is computed again by itself, in two passes (`exact`). Every score is within 1e-5 of the definition in exact
-//! numbers.
+//! Because t has zero mean, the shift of the window is free; it is the approximate mean of the surrounding pixels, and
+//! everything is summed in `f32`: numerators by `toom_cook`, Σ j' and Σ j'² by `moments`. The residual mean of the
+//! rounded template is corrected afterwards. If a window is so flat, or so far from that mean, that these sums would
+//! lose digits, the position is recomputed in two passes (`exact`). Every score is within 1e-5 of the definition in
+//! exact arithmetic.
 //!
-//! A surface is cut into bands of rows, a band into tiles of columns, whose pixels are copied and prepared at once; the
-//! rows of a tile are scored in groups as `toom_cook` takes them, each with a level and limits of its own.
+//! A score map is divided into bands of rows, a band into tiles of columns, whose pixels are copied and prepared at
+//! once; the rows of a tile are scored in the groups of `toom_cook`, each with its own level and limits.
 //!
 //! Windows without contrast score 0 and are counted; windows that touch an invalid pixel are excluded (R66).
-//! Each score depends on the region and its own band only, so the number of threads changes nothing.
+//! Each score depends on the region and its own band only, so that the result does not depend on the number of threads.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -39,19 +39,18 @@ use crate::image::invalid::InvalidCounts;
 use crate::image::patch::Patch;
 use crate::image::{GrayImage, PixelRect};
 
-/// Rows of positions that a band has, about.
+/// Approximate number of position rows in a band.
 const BAND_ROWS: usize = 140;
 
-/// Rows of pixels that are copied and prepared at once: few enough to stay in the nearest cache.
+/// Rows of pixels that are copied and prepared at once: few enough for the L1 cache.
 const LOADED_ROWS: usize = 16;
 
-/// Multiply-adds from which a second thread pays for being woken.
+/// Number of multiply-adds from which a second thread is worth its wake-up.
 const PARALLEL_WORK: usize = 2_000_000;
 
-/// Scores of a square template with an odd side at every position whose whole window lies in `region` and in
-/// the image.
+/// Scores of a square template with an odd side at every position whose whole window is inside `region` and the image.
 ///
-/// `None` when the template is not square, has an even side or an invalid pixel, or when no position holds it.
+/// `None` if the template is not square, has an even side or an invalid pixel, or fits at no position.
 pub fn zncc_surface(template: &Patch, image: &GrayImage, region: PixelRect) -> Option<Surface> {
     let size = template.width();
     if template.height() != size || size.is_multiple_of(2) {
@@ -79,7 +78,7 @@ pub fn zncc_surface(template: &Patch, image: &GrayImage, region: PixelRect) -> O
 
 /// The score of two patches of the same size (any size, for windows at sub-pixel positions).
 ///
-/// 0 when either has no contrast; `None` when the sizes differ, or either is empty or has an invalid pixel.
+/// 0 if either has no contrast; `None` if the sizes differ, or either is empty or has an invalid pixel.
 pub fn zncc(template: &Patch, window: &Patch) -> Option<f32> {
     Reference::new(template)?.score(window)
 }
@@ -88,12 +87,12 @@ pub fn zncc(template: &Patch, window: &Patch) -> Option<f32> {
 pub struct Reference(Template);
 
 impl Reference {
-    /// `None` when the patch is empty or has an invalid pixel.
+    /// `None` if the patch is empty or has an invalid pixel.
     pub fn new(patch: &Patch) -> Option<Self> {
         Template::new(patch).map(Self)
     }
 
-    /// The score of a window; 0 when either has no contrast, `None` when the sizes differ or a pixel is invalid.
+    /// The score of a window; 0 if either has no contrast, `None` if the sizes differ or a pixel is invalid.
     pub fn score(&self, window: &Patch) -> Option<f32> {
         let template = &self.0;
         let same_size =
@@ -105,7 +104,7 @@ impl Reference {
     }
 }
 
-/// What all positions share.
+/// Data shared by all positions.
 struct Job<'a> {
     exact: Template,
     /// The template as rounded to `f32`.
@@ -116,38 +115,38 @@ struct Job<'a> {
     weights_norm: f32,
     image: &'a GrayImage,
     region: PixelRect,
-    /// Made for the first tile with an invalid pixel, which nearly never comes.
+    /// Computed at the first tile with an invalid pixel, which is rare.
     invalid: OnceLock<Option<InvalidCounts>>,
-    /// Positions per row, and rows of them.
+    /// Positions per row, and number of rows.
     width: usize,
     height: usize,
     size: usize,
 }
 
-/// Buffers of a tile, used again for the next.
+/// Buffers of a tile, reused for the next.
 struct Scratch {
-    /// Side of the templates that they serve.
+    /// Side of the templates for which they are allocated.
     size: usize,
-    /// Pixels less about their mean, in phases.
+    /// Pixels minus their approximate mean, in phases.
     input: Buffer,
     /// Numerators, in phases.
     numerators: Buffer,
     moments: Moments,
     toom_cook: toom_cook::Scratch,
-    /// A row of pixels with what makes it whole vectors, or of scores.
+    /// A row of pixels, padded to whole vectors, or of scores.
     row: Buffer,
     /// Scores of a row, in phases.
     scores: Buffer,
-    /// A window by itself.
+    /// A single window, for `exact`.
     window: Vec<f32>,
 }
 
 thread_local! {
-    /// The buffers that the thread used last: making them anew would cost a tenth of a small surface.
+    /// The buffers that the thread used last: allocating them would take a tenth of the time of a small score map.
     static KEPT: Cell<Option<Box<Scratch>>> = const { Cell::new(None) };
 }
 
-/// Buffers that go back to their thread when they are done with.
+/// Buffers that return to their thread when dropped.
 struct Kept(Option<Box<Scratch>>);
 
 impl Kept {
@@ -184,32 +183,32 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// Scores the band of positions that starts at row `top`; gives the number of positions without contrast.
+    /// Scores the band of positions that starts at row `top`; returns the number of positions without contrast.
     fn band(&self, kept: &mut Kept, top: usize, scores: &mut [f32]) -> u32 {
         let Some(scratch) = kept.0.as_deref_mut() else { return 0 };
         Arch::new().dispatch(Band { job: self, scratch, top, scores })
     }
 
-    /// Rows of positions of a band: about as many as keep what is made of them in the second cache.
+    /// Rows of positions of a band: about as many as keep its data in the L2 cache.
     fn band_rows(&self) -> usize {
         let group = self.filters.group_rows();
         let rows = (BAND_ROWS / group).max(1) * group;
-        // A few rows more are no band of their own.
+        // A few additional rows do not form a band of their own.
         if self.height <= rows + self.few_rows() { self.height } else { rows }
     }
 
-    /// Rows of positions that are quicker one by one.
+    /// Largest number of position rows that are faster one by one.
     fn few_rows(&self) -> usize {
         self.size / 3
     }
 
-    /// Groups that `toom_cook` takes of `rows` rows of positions: what is left over, or all, may be few.
+    /// Number of `toom_cook` groups in `rows` rows of positions; too few remaining rows are summed one by one.
     fn groups(&self, rows: usize) -> usize {
         let group = self.filters.group_rows();
         rows / group + usize::from(rows % group > self.few_rows())
     }
 
-    /// Rows of pixels that `rows` rows of positions need, and the one below, which `moments` looks at.
+    /// Rows of pixels required by `rows` rows of positions, and the one below, which `moments` reads.
     fn pixel_rows(&self, rows: usize) -> usize {
         self.filters.pixel_rows(self.groups(rows)).max(rows + self.size)
     }
@@ -230,7 +229,7 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// The numerators of up to a group of rows of a tile, from the first of `rows` to one before the last.
+    /// Computes the numerators of up to a group of rows of a tile, from the first of `rows` to one before the last.
     #[inline(always)]
     fn numerators<S: Simd>(&self, simd: S, scratch: &mut Scratch, tile: Tile, rows: [usize; 2], level: f32) {
         let Scratch { numerators: output, toom_cook, .. } = scratch;
@@ -246,7 +245,8 @@ impl<'a> Job<'a> {
         self.invalid.get_or_init(|| InvalidCounts::of(self.image, self.region)).as_ref()
     }
 
-    /// Excludes positions with invalid pixels and computes the doubtful ones by themselves; counts those without contrast.
+    /// Excludes positions with invalid pixels and recomputes the doubtful ones; returns the number of those without
+    /// contrast.
     #[inline(always)]
     fn repair_row<S: Simd>(
         &self,
@@ -280,8 +280,8 @@ impl<'a> Job<'a> {
         flat
     }
 
-    /// Copies the pixels of a tile of `rows` × `columns` positions and prepares them; gives the region's invalid pixels
-    /// where the tile has any.
+    /// Copies and prepares the pixels of a tile of `rows` × `columns` positions; returns the region's invalid pixels if
+    /// the tile has any.
     #[inline(always)]
     fn load<S: Simd>(
         &self,
@@ -298,7 +298,7 @@ impl<'a> Job<'a> {
         self.invalid()
     }
 
-    /// Whether all pixels that were copied are valid.
+    /// Copies the pixels; returns whether all of them are valid.
     #[inline(always)]
     fn load_rows<S: Simd, const CHECKED: bool>(
         &self,
@@ -324,7 +324,7 @@ impl<'a> Job<'a> {
     }
 }
 
-/// The scores of a band of rows: all of it runs with the widest vectors of the processor.
+/// The scores of a band of rows, computed with the widest vectors of the processor.
 struct Band<'s, 'a> {
     job: &'s Job<'a>,
     scratch: &'s mut Scratch,
@@ -337,7 +337,7 @@ impl WithSimd for Band<'_, '_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) -> u32 {
-        // A loop: what a closure calls would not be compiled for these vectors.
+        // A loop, because code called by a closure would not be compiled for these vectors.
         let mut flat = 0;
         for left in (0..self.job.width).step_by(TILE_COLUMNS) {
             flat += self.tile(simd, left);
@@ -347,7 +347,7 @@ impl WithSimd for Band<'_, '_> {
 }
 
 impl Band<'_, '_> {
-    /// Scores the tile from column `left` on; gives the number of positions without contrast.
+    /// Scores the tile that starts at column `left`; returns the number of positions without contrast.
     #[inline(always)]
     fn tile<S: Simd>(&mut self, simd: S, left: usize) -> u32 {
         let Self { job, scratch, top, scores } = self;
@@ -358,7 +358,8 @@ impl Band<'_, '_> {
         let (group, mut flat) = (job.filters.group_rows(), 0);
         for first in (0..rows).step_by(group) {
             let last = (first + group).min(rows);
-            // The brightness nearby, not that of the whole tile: what a window differs from it costs digits.
+            // The brightness nearby, not that of the whole tile: a window loses digits with its difference from this
+            // level.
             let extent = [last - first + job.size - 1, (columns + job.size - 1) / PHASES];
             let level = rough_mean(&scratch.input[first * tile.pixels..], tile.pixels, extent);
             scratch.moments.down(simd, tile, &scratch.input, [first, last], level);

@@ -14,7 +14,7 @@ fn noise(width: u32, height: u32, level: f32, contrast: f32, seed: u64) -> GrayI
     GrayImage::from_fn(width, height, |_, _| Luma([level + contrast * (random.random::<f32>() * 2.0 - 1.0)]))
 }
 
-/// K-Eq 11 as it stands in the paper; `None` for a window with an invalid pixel, 0 for one without contrast.
+/// K-Eq 11 as printed; `None` for a window with an invalid pixel, 0 for one without contrast.
 fn naive(template: &[f32], window: &[f32]) -> Option<f64> {
     if window.iter().any(|v| !v.is_finite()) {
         return None;
@@ -39,7 +39,7 @@ fn patch_at(image: &GrayImage, x: u32, y: u32, size: u32) -> Patch {
     GrayImage::from_raw(size, size, window(image, x, y, size)).unwrap().into()
 }
 
-/// Compares every position with the definition; gives the largest difference.
+/// Compares every position with the definition; returns the largest difference.
 fn assert_exact(template: &Patch, image: &GrayImage, region: PixelRect, tolerance: f64) -> f64 {
     let surface = zncc_surface(template, image, region).unwrap();
     let (size, mut worst) = (template.width(), 0.0_f64);
@@ -69,7 +69,7 @@ fn scores_equal_the_definition_for_odd_sizes_from_5_to_41() {
 #[test]
 fn scores_equal_the_definition_over_several_bands_and_tiles_and_for_large_templates() {
     let (image, other) = (noise(340, 330, 0.5, 0.4, 5), noise(160, 160, 0.3, 0.2, 6));
-    // 11: rest of one row; 21: three bands, the last of two groups; 101: less than a group.
+    // 11: one remaining row; 21: three bands, the last of two groups; 101: less than a group.
     for (size, region) in [
         (3, PixelRect::new(3, 1, 150, 140)),
         (11, PixelRect::new(1, 2, 300, 155)),
@@ -100,7 +100,8 @@ fn low_contrast_beside_a_bright_edge_keeps_its_digits() {
 
 #[test]
 fn a_quiet_patch_among_loud_ones_keeps_its_digits_up_to_where_it_is_scored_by_itself() {
-    // Tiles err with their loudest pixels: windows up to 24 times quieter are left to them.
+    // Errors of a tile scale with its brightest pixels: windows of up to 24 times less contrast are scored with the
+    // tile.
     let loud = noise(200, 110, 0.5, 0.45, 21);
     for quieter in [6.0, 12.0, 18.0, 23.0, 40.0] {
         let image = GrayImage::from_fn(200, 110, |x, y| {

@@ -1,14 +1,14 @@
 //! Gradients of a patch by central differences: `gx = (I(x+1, y) − I(x−1, y)) / 2`, likewise `gy`.
 //!
-//! Unit: fractions of full scale per px. The outermost pixels have no neighbour on one side and neighbours of
-//! invalid pixels have no difference: there the gradient is NaN.
+//! Unit: fractions of full scale per px. The gradient is NaN at the outermost pixels and beside invalid pixels, where
+//! the difference does not exist.
 
 use image::Luma;
 
 use super::GrayImage;
 use super::patch::Patch;
 
-/// Gradients to the right and downwards, in the patch's unit per px, the size of the patch; NaN on its rim.
+/// Gradients to the right and downwards, in the patch's unit per px; same size as the patch, NaN on its rim.
 pub fn central(patch: &Patch) -> (Patch, Patch) {
     (difference(patch, 1, 0), difference(patch, 0, 1))
 }

@@ -1,4 +1,4 @@
-//! How many pixels of a window are invalid, in four reads: an integral image (Crow 1984) of counts.
+//! Number of invalid pixels in a window, in four reads: an integral image (Crow 1984) of counts.
 //!
 //! ```text
 //! I(x, y) = number of invalid pixels above y and left of x
@@ -12,14 +12,14 @@ use super::{GrayImage, PixelRect};
 /// Counts of the invalid pixels of a region.
 #[derive(Clone, Debug)]
 pub struct InvalidCounts {
-    /// Counts in a row of I: one more than pixels.
+    /// Length of a row of I: one more than the number of pixels.
     stride: usize,
     /// I.
     counts: Vec<u32>,
 }
 
 impl InvalidCounts {
-    /// The counts of a region that lies inside the image; `None` when all its pixels are valid.
+    /// Counts of a region inside the image; `None` if all its pixels are valid.
     pub fn of(image: &GrayImage, region: PixelRect) -> Option<Self> {
         let (width, height) = (region.width as usize, region.height as usize);
         let row = |y: usize| {
@@ -41,14 +41,14 @@ impl InvalidCounts {
         Some(Self { stride, counts })
     }
 
-    /// Whether all of `size` × `size` pixels from `first` (column, row of the region) are valid.
+    /// Returns whether all of `size` × `size` pixels from `first` (column, row of the region) are valid.
     pub fn none_in(&self, [x, y]: [usize; 2], size: usize) -> bool {
         let at = |x: usize, y: usize| self.counts[y * self.stride + x];
         at(x + size, y + size) + at(x, y) == at(x, y + size) + at(x + size, y)
     }
 }
 
-/// Whether all values are finite: every one is looked at, many side by side.
+/// Returns whether all values are finite; reads every one, vectorised.
 struct IsWhole<'a>(&'a [f32]);
 
 impl WithSimd for IsWhole<'_> {
@@ -57,7 +57,7 @@ impl WithSimd for IsWhole<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> bool {
         let (vectors, rest) = S::as_simd_f32s(self.0);
-        // 0 · v is 0 for a finite v, and not a number for any other.
+        // 0 · v is 0 for a finite v, and NaN for any other.
         let (zero, mut sum) = (simd.splat_f32s(0.0), simd.splat_f32s(0.0));
         for v in vectors {
             sum = simd.mul_add_e_f32s(*v, zero, sum);

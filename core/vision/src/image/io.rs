@@ -1,12 +1,12 @@
 //! Reading and writing PNG files.
 //!
-//! Detector numbers become fractions of full scale: value = DN / full scale. Full scale is 255 for 8 bits and
-//! 65535 for 16 bits unless the caller knows better (12-bit data in 16-bit files: 4095). Colour becomes
-//! luma = 0.2126 R + 0.7152 G + 0.0722 B (ITU-R BT.709); transparency is ignored.
+//! Detector numbers become fractions of full scale: value = DN / full scale. Full scale is 255 for 8 bits and 65535 for
+//! 16 bits unless given by the caller (12-bit data in 16-bit files: 4095). Colour becomes luma = 0.2126 R + 0.7152 G +
+//! 0.0722 B (ITU-R BT.709); transparency is ignored.
 //!
-//! A file says how much memory it wants before it shows a pixel, so the size is checked first: nothing above
-//! [`MAX_PIXELS`] is decoded, or above the size that is expected, and what else is in the file may take as much memory as
-//! those pixels and 4 MiB.
+//! The header alone determines the memory of the decoded pixels, so the size is checked first: images above
+//! [`MAX_PIXELS`], or above the expected size, are not decoded, and the decoder may allocate at most 8 bytes per allowed
+//! pixel plus 4 MiB.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Cursor, ErrorKind, Read, Seek};
@@ -18,7 +18,7 @@ use image::{DynamicImage, ImageBuffer, ImageDecoder, ImageError, ImageFormat, Li
 use super::GrayImage;
 use sightline_geometry::error::{Error, Result};
 
-/// Largest image that is read, pixels.
+/// Largest number of pixels of an image that is read.
 pub const MAX_PIXELS: u64 = 64_000_000;
 
 /// Memory of a decoded pixel, bytes: four 16-bit channels.
@@ -30,17 +30,17 @@ const METADATA_BYTES: u64 = 4 << 20;
 /// First bytes of every PNG file: signature, length and name of the header chunk.
 const PNG_START: [u8; 16] = *b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR";
 
-/// Reads an 8- or 16-bit PNG file; `full_scale_dn` is the detector number that becomes 1.
+/// Reads an 8- or 16-bit PNG file; `full_scale_dn` is the detector number of value 1.
 ///
 /// # Errors
-/// [`Error::Read`] when the file cannot be opened; [`Error::Format`] when it is no PNG, is damaged or too large.
+/// [`Error::Read`] if the file cannot be opened; [`Error::Format`] if it is no PNG, is damaged or too large.
 pub fn read_png(path: impl AsRef<Path>, full_scale_dn: Option<f64>) -> Result<GrayImage> {
     let path = path.as_ref();
     decode(open(path)?, path, full_scale_dn, MAX_PIXELS)
 }
 
-/// The same for a file that should have `size`, width and height in px: one of more pixels is not decoded. The caller
-/// compares the sizes, with [`png_size`] before and with the image after.
+/// As [`read_png`], for a file that should have `size`, width and height in px: an image with more pixels is not
+/// decoded. The caller compares the sizes, with [`png_size`] before and with the image after.
 ///
 /// # Errors
 /// As [`read_png`].
@@ -49,7 +49,7 @@ pub fn read_png_of_size(path: &Path, full_scale_dn: Option<f64>, size: [u32; 2])
     decode(open(path)?, path, full_scale_dn, pixels.min(MAX_PIXELS))
 }
 
-/// Width and height that the header of a PNG file states, px; no pixel is decoded.
+/// Width and height in the header of a PNG file, px; no pixel is decoded.
 ///
 /// # Errors
 /// As [`read_png`].
@@ -68,12 +68,12 @@ pub fn png_size(path: &Path) -> Result<[u32; 2]> {
     }
 }
 
-/// Opens a file for reading, unless it is something else, such as a named pipe, which might never answer.
+/// Opens a file for reading if it is a regular file; others, such as a named pipe, may block for ever.
 ///
 /// # Errors
-/// A missing file, a folder, a pipe, a device or a socket.
+/// For a missing file, a folder, a pipe, a device or a socket.
 pub fn open_regular(path: &Path) -> std::io::Result<File> {
-    // A pipe would block already when it is opened.
+    // A pipe would block in the call to open it.
     if std::fs::metadata(path)?.is_file() {
         File::open(path)
     } else {
@@ -85,26 +85,26 @@ fn open(path: &Path) -> Result<BufReader<File>> {
     open_regular(path).map(BufReader::new).map_err(|source| Error::Read { path: path.into(), source })
 }
 
-/// Decodes the bytes of a PNG file; `name` is what messages call it.
+/// Decodes the bytes of a PNG file; `name` is used in error messages.
 ///
 /// # Errors
-/// [`Error::Format`] when the bytes are no PNG, are damaged or hold too large an image.
+/// [`Error::Format`] if the bytes are no PNG, are damaged or contain too large an image.
 pub fn decode_png(bytes: &[u8], name: impl AsRef<Path>, full_scale_dn: Option<f64>) -> Result<GrayImage> {
     decode(Cursor::new(bytes), name.as_ref(), full_scale_dn, MAX_PIXELS)
 }
 
-/// Writes 8 bits: 1 becomes 255; values are cut to 0…1, invalid pixels become 0.
+/// Writes 8 bits: 1 becomes 255; values are clamped to 0…1, invalid pixels become 0.
 ///
 /// # Errors
-/// [`Error::Write`] when the file cannot be written; [`Error::Format`] for an image without pixels.
+/// [`Error::Write`] if the file cannot be written; [`Error::Format`] for an image without pixels.
 pub fn write_png_u8(path: impl AsRef<Path>, image: &GrayImage) -> Result<()> {
     write(path.as_ref(), &to_u8(image))
 }
 
-/// Writes 16 bits: 1 becomes `full_scale_dn` (default 65535); values are cut to 0…1, invalid pixels become 0.
+/// Writes 16 bits: 1 becomes `full_scale_dn` (default 65535); values are clamped to 0…1, invalid pixels become 0.
 ///
 /// # Errors
-/// [`Error::Write`] when the file cannot be written; [`Error::Format`] for an image without pixels.
+/// [`Error::Write`] if the file cannot be written; [`Error::Format`] for an image without pixels.
 pub fn write_png_u16(path: impl AsRef<Path>, image: &GrayImage, full_scale_dn: Option<f64>) -> Result<()> {
     write(path.as_ref(), &to_u16(image, full_scale_dn))
 }
@@ -152,7 +152,7 @@ fn decode(
     Ok(to_gray(decoded, full_scale_dn))
 }
 
-/// Fractions of full scale from whatever the file held.
+/// Converts any decoded image to fractions of full scale.
 fn to_gray(decoded: DynamicImage, full_scale_dn: Option<f64>) -> GrayImage {
     let scale8 = 1.0 / full_scale_dn.unwrap_or(255.0);
     let scale16 = 1.0 / full_scale_dn.unwrap_or(65_535.0);

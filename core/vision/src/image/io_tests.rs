@@ -8,7 +8,7 @@ fn ramp(levels: u32, full_scale: f64) -> GrayImage {
     })
 }
 
-/// A PNG that announces a size and ends; the checksum of the header is right, so only the size can be refused.
+/// A PNG whose header has a size but no pixels; its checksum is correct, so that only the size can be refused.
 fn header_only(width: u32, height: u32) -> Vec<u8> {
     let mut ihdr = b"IHDR".to_vec();
     ihdr.extend(width.to_be_bytes());

@@ -1,7 +1,7 @@
 //! Images: grey, `f32`, in fractions of full scale (0 = black, 1 = the detector's largest number).
 //!
-//! Geometry is in `f64` and pixels are in `f32`; conversions happen only at this border.
-//! NaN marks an invalid pixel: missing data, or outside the source of a resampled patch (R66).
+//! Geometry is in `f64` and pixels are in `f32`; conversions happen only between the two. NaN marks an invalid pixel:
+//! missing data, or outside the source of a resampled patch (R66).
 
 pub mod rect;
 pub mod sample;

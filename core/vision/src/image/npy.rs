@@ -1,7 +1,8 @@
-//! Arrays as NumPy files (`.npy`, format version 1.0): dense evidence such as score surfaces, and the truth of pictures.
+//! Arrays as NumPy files (`.npy`, format version 1.0): dense data such as score maps, and the ground truth of rendered
+//! images.
 //!
-//! Images are two-dimensional `f32`; rows are image rows (C order, `<f4`); NaN stays NaN. Arrays of `f64` and in
-//! column order are read too. Arrays of other numbers and shapes are written by [`encode_array`].
+//! Images are two-dimensional `f32`; rows are image rows (C order, `<f4`); NaN stays NaN. Arrays of `f64` and in column
+//! order can be read too. [`encode_array`] writes arrays of other types and shapes.
 
 use std::path::Path;
 
@@ -14,15 +15,15 @@ use sightline_geometry::error::{Error, Result};
 /// The bytes of a `.npy` file with the image as an array of shape (height, width).
 ///
 /// # Errors
-/// [`Error::Format`] when the writer fails, which memory alone can cause.
+/// [`Error::Format`] if the writer fails, which only lack of memory can cause.
 pub fn encode(image: &GrayImage) -> Result<Vec<u8>> {
     encode_array(image.as_raw(), &[image.height(), image.width()])
 }
 
-/// The bytes of a `.npy` file with an array of any shape, its last axis running fastest.
+/// The bytes of a `.npy` file with an array of any shape; the last axis varies fastest.
 ///
 /// # Errors
-/// [`Error::Format`] when the shape does not hold as many values, or as [`encode`].
+/// [`Error::Format`] if the number of values does not match the shape, or as [`encode`].
 pub fn encode_array<T: AutoSerialize + Copy>(values: &[T], shape: &[u32]) -> Result<Vec<u8>> {
     let failed =
         |error: std::io::Error| Error::format("array", format!("cannot be written as .npy ({error})"));
@@ -39,10 +40,10 @@ pub fn encode_array<T: AutoSerialize + Copy>(values: &[T], shape: &[u32]) -> Res
     Ok(bytes)
 }
 
-/// The image in the bytes of a `.npy` file; `name` is what messages call it.
+/// Decodes the image in the bytes of a `.npy` file; `name` is used in error messages.
 ///
 /// # Errors
-/// [`Error::Format`] when the bytes are no 2-D array of floats, are cut short, or hold too large an array.
+/// [`Error::Format`] if the bytes are no 2-D array of floats, are truncated, or contain too large an array.
 pub fn decode(bytes: &[u8], name: impl AsRef<Path>) -> Result<GrayImage> {
     let problem = |text: String| Error::format(name.as_ref(), text);
     let damaged =

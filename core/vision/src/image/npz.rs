@@ -1,4 +1,4 @@
-//! Several arrays in one file (`.npz`), as `numpy.savez` writes it: a ZIP that holds a `.npy` file for each, not compressed.
+//! Several arrays in one file (`.npz`), as written by `numpy.savez`: an uncompressed ZIP with one `.npy` file per array.
 
 use std::io::{Cursor, Read, Write};
 use std::path::Path;
@@ -9,13 +9,13 @@ use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
 use sightline_geometry::error::{Error, Result};
 
-/// What every entry's name ends with; NumPy leaves it out of the array's name.
+/// Suffix of every entry's name, which NumPy omits from the array's name.
 const ENDING: &str = ".npy";
 
-/// The bytes of a `.npz` file with these arrays, each the bytes of a `.npy` file; the same arrays give the same bytes.
+/// The bytes of a `.npz` file with these arrays, each given as the bytes of a `.npy` file; deterministic.
 ///
 /// # Errors
-/// [`Error::Format`] when two have the same name.
+/// [`Error::Format`] if two arrays have the same name.
 pub fn encode<'a>(arrays: impl IntoIterator<Item = (&'a str, Vec<u8>)>) -> Result<Vec<u8>> {
     let failed = |error: ZipError| Error::format("arrays", format!("cannot be written as .npz ({error})"));
     let options = SimpleFileOptions::default()
@@ -29,12 +29,12 @@ pub fn encode<'a>(arrays: impl IntoIterator<Item = (&'a str, Vec<u8>)>) -> Resul
     Ok(file.finish().map_err(failed)?.into_inner())
 }
 
-/// The arrays in the bytes of such a file: their names, and of each the bytes of a `.npy` file; `name` is what messages call
-/// the file.
+/// Decodes the arrays in the bytes of a `.npz` file: name and bytes of the `.npy` file of each; `name` is used in error
+/// messages.
 ///
 /// # Errors
-/// [`Error::Format`] when the bytes are no ZIP, are cut short or damaged, or hold something compressed, which could unpack
-/// to any size.
+/// [`Error::Format`] if the bytes are no ZIP, are truncated or damaged, or contain a compressed entry, which could
+/// expand to any size.
 pub fn decode(bytes: &[u8], name: impl AsRef<Path>) -> Result<Vec<(String, Vec<u8>)>> {
     let damaged = |error: &dyn std::fmt::Display| {
         Error::format(name.as_ref(), format!("not a .npz file that can be read ({error})"))

@@ -1,24 +1,24 @@
 //! Patches: small square windows cut or resampled from an image (K§4.3.1, R51, R58, R59).
 //!
-//! Resampling by scale and roll (R58): the output at offset (u, v) from its middle takes the source at
+//! Resampling by scale and roll (R58): the output at offset (u, v) from its centre samples the source at
 //! ```text
 //! centre + (1/s) [[cos ρ, sin ρ], [−sin ρ, cos ρ]] (u, v)ᵀ
 //! ```
-//! so content grows with s and turns clockwise on screen with ρ. A warp takes any linear map F in place of s R(ρ), and
-//! s is then √|det F|: foreshortening differs little from one stop to the next. When s < 1 the source is first smoothed
-//! (R58), otherwise detail finer than the new pixel grid would fold into false texture. The width of the Gaussian is
+//! so content grows with s and rotates clockwise on screen with ρ. A warp takes any linear map F in place of s R(ρ),
+//! with s = √|det F|: foreshortening differs little between consecutive stops. If s < 1 the source is smoothed first
+//! (R58), otherwise detail finer than the new pixel grid would alias. The standard deviation of the Gaussian is
 //! ```text
 //! σ = 0.5 · sqrt(1/s² − 1)   source px
 //! ```
-//! which takes the blur of half a pixel that any sampled image has to half a pixel of the *output* (Lowe 2004,
-//! section 3.3). The Gaussian is normalised over the valid pixels inside the image, and an invalid pixel stays
+//! which changes the blur of half a source pixel, assumed for any sampled image, to half a pixel of the *output* (Lowe
+//! 2004, section 3.3). The Gaussian is normalised over the valid pixels inside the image, and an invalid pixel stays
 //! invalid.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
 //! | s | `scale` | – |
 //! | ρ | `roll_rad` | rad, clockwise on screen positive |
-//! | u, v | offset from the patch's middle | px |
+//! | u, v | offset from the patch's centre | px |
 
 use std::ops::{Deref, DerefMut};
 
@@ -29,19 +29,19 @@ use super::sample::Kernel;
 use super::{GrayImage, PixelRect, resample};
 use sightline_geometry::frames::Pixel;
 
-/// Blur that a sampled image is taken to have, px.
+/// Assumed blur of a sampled image, px.
 const NATURAL_BLUR_PX: f64 = 0.5;
 
 /// Standard deviation below which a patch counts as flat, fractions of full scale.
 ///
-/// Interpolating a constant leaves noise of 3e-8 in `f32`; one pixel of a 41 × 41 window that differs by one
-/// part in 65535 makes 3.7e-7.
+/// Interpolating a constant has noise of 3e-8 in `f32`; one pixel of a 41 × 41 window that differs by one part in 65535
+/// gives 3.7e-7.
 pub const FLAT_STD: f64 = 1e-7;
 
-/// How far from a window its source is read at most, px: farther than any image reaches, and small enough for `i32`.
+/// Largest distance from a window at which its source is read, px: larger than any image, and small enough for `i32`.
 const REACH_MAX_PX: f64 = 1e6;
 
-/// A window of an image, or one resampled from it; NaN = invalid. It reads like the image it wraps.
+/// A window of an image, or one resampled from it; NaN = invalid. It dereferences to its image.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Patch(GrayImage);
 
@@ -51,28 +51,28 @@ impl Patch {
         &self.0
     }
 
-    /// Mean of the valid pixels, fraction of full scale; `None` when there are none.
+    /// Mean of the valid pixels, fraction of full scale; `None` without any.
     pub fn mean(&self) -> Option<f64> {
         moments(&self.0).map(|(mean, _)| mean)
     }
 
-    /// Standard deviation of the valid pixels (divisor n), fraction of full scale; `None` when there are none.
+    /// Standard deviation of the valid pixels (divisor n), fraction of full scale; `None` without any.
     pub fn std(&self) -> Option<f64> {
         moments(&self.0).map(|(_, std)| std)
     }
 
-    /// Share of the pixels that are valid, 0 to 1; 0 for an empty patch.
+    /// Fraction of the pixels that are valid, 0 to 1; 0 for an empty patch.
     pub fn valid_share(&self) -> f64 {
         let total = self.0.as_raw().len();
         if total == 0 { 0.0 } else { valid(&self.0).count() as f64 / total as f64 }
     }
 
-    /// Whether every pixel is valid.
+    /// Returns whether every pixel is valid.
     pub fn is_complete(&self) -> bool {
         self.0.as_raw().iter().all(|v| v.is_finite())
     }
 
-    /// Whether the patch has no texture: its standard deviation is below [`FLAT_STD`].
+    /// Returns whether the patch has no texture: its standard deviation is below [`FLAT_STD`].
     pub fn is_flat(&self) -> bool {
         self.std().is_none_or(|std| std < FLAT_STD)
     }
@@ -98,15 +98,16 @@ impl DerefMut for Patch {
     }
 }
 
-/// The (2·half + 1)² window about the sub-pixel `centre`; NaN where it lies outside or touches an invalid pixel.
+/// The (2·half + 1)² window about the sub-pixel `centre`; NaN outside the image or touching an invalid pixel.
 pub fn extract(image: &GrayImage, centre: Pixel, half: u32, kernel: Kernel) -> Patch {
     resample::window(image, centre, &Matrix2::identity(), half, kernel).into()
 }
 
-/// The window of `size` × `size` px about `centre`, its content magnified by `scale` and rolled by `roll_rad` (R58).
+/// The window of `size` × `size` px about `centre`, with its content magnified by `scale` and rolled by `roll_rad`
+/// (R58).
 ///
-/// `size` is odd. NaN where the source lies outside or touches an invalid pixel, and everywhere unless `scale`
-/// is positive and finite.
+/// `size` must be odd. NaN outside the source or touching an invalid pixel, and everywhere unless `scale` is positive
+/// and finite.
 pub fn scale_roll(
     source: &GrayImage,
     centre: Pixel,
@@ -115,15 +116,15 @@ pub fn scale_roll(
     size: u32,
     kernel: Kernel,
 ) -> Patch {
-    // Any other number gives a map without inverse, or one that turns the patch over.
+    // Any other value makes the map singular, or a reflection.
     let map = Rotation2::new(roll_rad).into_inner() * if scale > 0.0 { scale } else { 0.0 };
     warp(source, centre, &map, size, kernel)
 }
 
-/// The window of `size` × `size` px about `centre`, its content mapped by `map`, px per px.
+/// The window of `size` × `size` px about `centre`, with its content mapped by `map`, px per px.
 ///
-/// Where the map shrinks, by the square root of its determinant, the source is smoothed first. `size` is odd. NaN
-/// where the source lies outside or touches an invalid pixel, and everywhere unless the map can be inverted.
+/// If the map shrinks (determinant below 1), the source is smoothed first. `size` must be odd. NaN outside the source or
+/// touching an invalid pixel, and everywhere if the map is singular.
 pub fn warp(source: &GrayImage, centre: Pixel, map: &Matrix2<f64>, size: u32, kernel: Kernel) -> Patch {
     let scale = map.determinant().abs().sqrt();
     let Some(inverse) = map.try_inverse().filter(|_| scale.is_finite()) else {
@@ -144,10 +145,10 @@ pub fn warp(source: &GrayImage, centre: Pixel, map: &Matrix2<f64>, size: u32, ke
     }
 }
 
-/// The window of `size` × `size` px whose pixel at offset o from its middle shows the source at `from(o)`, a map that is
-/// nearly linear over the window and magnifies by `scale`.
+/// The window of `size` × `size` px whose pixel at offset o from its centre samples the source at `from(o)`, a map that
+/// is nearly linear over the window and magnifies by `scale`.
 ///
-/// Where it shrinks the source is smoothed first. NaN where `from` gives nothing, and as for [`warp`].
+/// If it shrinks, the source is smoothed first. NaN where `from` returns `None`, and as for [`warp`].
 pub fn warp_by(
     source: &GrayImage,
     scale: f64,
@@ -171,13 +172,13 @@ pub fn warp_by(
     }
 }
 
-/// Whether content is shrunk; rounding may leave the scale of a pure rotation a little below one.
+/// Returns whether content is shrunk; rounding may make the scale of a pure rotation slightly less than 1.
 fn shrinks(scale: f64) -> bool {
     scale < 1.0 - 1e-12
 }
 
-/// The source up to `farthest` px from `centre`, smoothed for `scale` < 1, and the offset of its first pixel; nothing
-/// where that lies outside the source.
+/// The source up to `farthest` px from `centre`, smoothed for `scale` < 1, and the offset of its first pixel; `None`
+/// outside the source.
 fn smoothed(
     source: &GrayImage,
     centre: Pixel,
@@ -192,8 +193,8 @@ fn smoothed(
     Some((blurred(&crop(source, &part), sigma_px), corner))
 }
 
-/// The window of `size` × `size` px whose pixel at offset o from its middle shows the source at `from(o)`; NaN where
-/// that is nothing, outside, or touches an invalid pixel.
+/// The window of `size` × `size` px whose pixel at offset o from its centre samples the source at `from(o)`; NaN where
+/// that is `None`, outside, or touches an invalid pixel.
 pub fn resample_through(
     source: &GrayImage,
     size: u32,
@@ -208,16 +209,16 @@ pub fn resample_through(
     Patch(GrayImage::from_fn(size, size, |x, y| Luma([read(x, y).unwrap_or(f32::NAN)])))
 }
 
-/// The patch with zero mean and unit standard deviation (over its valid pixels); `None` when it is flat.
+/// The patch with zero mean and unit standard deviation (over its valid pixels); `None` if it is flat.
 pub fn normalise(patch: &Patch) -> Option<Patch> {
     let (mean, std) = moments(patch).filter(|(_, std)| *std >= FLAT_STD)?;
     let scaled = patch.as_raw().iter().map(|v| ((f64::from(*v) - mean) / std) as f32).collect();
     GrayImage::from_raw(patch.width(), patch.height(), scaled).map(Patch)
 }
 
-/// `a − b` after both are normalised, in standard deviations; a flat patch counts as zero everywhere.
+/// `a − b`, each normalised first, in standard deviations; a flat patch is zero everywhere.
 ///
-/// NaN where either is invalid or beyond the smaller of the two.
+/// NaN where either is invalid or outside the smaller of the two.
 pub fn normalised_difference(a: &Patch, b: &Patch) -> Patch {
     let level = |patch: &Patch| {
         normalise(patch).unwrap_or_else(|| {
@@ -233,7 +234,7 @@ pub fn normalised_difference(a: &Patch, b: &Patch) -> Patch {
     }))
 }
 
-/// The middle `size` × `size` px of a square patch; `None` when it is smaller, or the two have no common middle.
+/// The middle `size` × `size` px of a square patch; `None` if it is smaller, or if the centres would differ.
 pub fn middle(patch: &Patch, size: u32) -> Option<Patch> {
     let inset = patch.width().checked_sub(size)?;
     let is_centred = patch.width() == patch.height() && inset.is_multiple_of(2);
@@ -241,20 +242,20 @@ pub fn middle(patch: &Patch, size: u32) -> Option<Patch> {
     is_centred.then(|| Patch(crop(patch, &part)))
 }
 
-/// The pixels of `part`, which lies inside the image.
+/// The pixels of `part`, which must be inside the image.
 pub fn crop(image: &GrayImage, part: &PixelRect) -> GrayImage {
     GrayImage::from_fn(part.width, part.height, |x, y| *image.get_pixel(x + part.x as u32, y + part.y as u32))
 }
 
 /// Gaussian smoothing, normalised over the valid pixels inside the image; invalid pixels stay invalid.
 ///
-/// The kernel ends at 3σ, or at the image's longest side where that is shorter: taps beyond it read no pixel.
+/// The kernel is truncated at 3σ, or at the image's longest side if that is shorter: taps beyond it read no pixel.
 pub fn blurred(image: &GrayImage, sigma_px: f64) -> GrayImage {
     let (width, height) = (image.width() as usize, image.height() as usize);
     let radius = (3.0 * sigma_px).ceil().min(width.max(height) as f64) as usize;
     let weights: Vec<f64> =
         (0..=radius).map(|i| (-0.5 * (i as f64 / sigma_px.max(1e-9)).powi(2)).exp()).collect();
-    // The weighted values and the weights are summed separately, so that both passes stay separable.
+    // Weighted values and weights are summed separately, which keeps both passes separable.
     let mut values: Vec<f64> =
         image.as_raw().iter().map(|v| if v.is_finite() { f64::from(*v) } else { 0.0 }).collect();
     let mut sums: Vec<f64> = image.as_raw().iter().map(|v| f64::from(u8::from(v.is_finite()))).collect();
@@ -267,7 +268,7 @@ pub fn blurred(image: &GrayImage, sigma_px: f64) -> GrayImage {
     out
 }
 
-/// Each row convolved with the symmetric kernel whose weights from its middle on are `weights`.
+/// Convolves each row with the symmetric kernel whose weights from its centre on are `weights`.
 fn along_rows(plane: &[f64], width: usize, weights: &[f64]) -> Vec<f64> {
     let mut out = vec![0.0; plane.len()];
     for (to, from) in out.chunks_exact_mut(width.max(1)).zip(plane.chunks_exact(width.max(1))) {
@@ -283,7 +284,7 @@ fn along_rows(plane: &[f64], width: usize, weights: &[f64]) -> Vec<f64> {
     out
 }
 
-/// Each column convolved with the symmetric kernel whose weights from its middle on are `weights`.
+/// Convolves each column with the symmetric kernel whose weights from its centre on are `weights`.
 fn along_columns(plane: &[f64], width: usize, weights: &[f64]) -> Vec<f64> {
     let rows: Vec<&[f64]> = plane.chunks_exact(width.max(1)).collect();
     let mut out = vec![0.0; plane.len()];
@@ -318,7 +319,7 @@ fn valid(image: &GrayImage) -> impl Iterator<Item = f64> {
     image.as_raw().iter().filter(|v| v.is_finite()).map(|v| f64::from(*v))
 }
 
-/// Mean and standard deviation of the valid pixels in two passes, which a large mean cannot spoil.
+/// Mean and standard deviation of the valid pixels, in two passes to avoid cancellation with a large mean.
 fn moments(image: &GrayImage) -> Option<(f64, f64)> {
     let (sum, count) = valid(image).fold((0.0, 0_u32), |(sum, count), v| (sum + v, count + 1));
     let count = (count > 0).then_some(f64::from(count))?;

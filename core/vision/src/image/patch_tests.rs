@@ -1,4 +1,4 @@
-//! Tests of cutting and resampling against an analytic texture, whose rotated and magnified forms are known.
+//! Tests of cropping and resampling with an analytic texture, whose rotated and magnified forms are known.
 
 use super::*;
 
@@ -15,7 +15,7 @@ fn image_of(side: u32, f: impl Fn(f64, f64) -> f64) -> GrayImage {
     GrayImage::from_fn(side, side, |x, y| Luma([f(f64::from(x), f64::from(y)) as f32]))
 }
 
-/// Largest difference between a patch and `f` of the offset from its middle.
+/// Largest difference between a patch and `f` of the offset from its centre.
 fn worst(patch: &Patch, f: impl Fn(f64, f64) -> f64) -> f64 {
     let half = f64::from(patch.width() / 2);
     let difference = |(x, y, p): (u32, u32, &Luma<f32>)| {
@@ -54,7 +54,7 @@ fn a_whole_pixel_window_is_a_copy_and_what_lies_outside_is_invalid() {
 
 #[test]
 fn scale_roll_shows_a_texture_rolled_and_magnified_forward_and_back() {
-    // The source seen through scale s and roll ρ: offset o in the output shows the texture at (1/s) R(−ρ) o.
+    // The source resampled by scale s and roll ρ: offset o in the output is the texture at (1/s) R(−ρ) o.
     let centre = Pixel::new(60.4, 58.7);
     let image = image_of(120, texture);
     for (scale, roll_deg) in [(1.0, 10.0), (1.0, -10.0), (1.0, 90.0), (1.25, 0.0), (1.25, 7.0), (2.0, -30.0)]
@@ -73,7 +73,7 @@ fn scale_roll_shows_a_texture_rolled_and_magnified_forward_and_back() {
 
 #[test]
 fn positive_roll_turns_content_clockwise_on_screen() {
-    // A bright spot to the right of the middle moves down (y is down) when the content turns clockwise.
+    // A bright spot to the right of the centre moves down (y is down) if the content rotates clockwise.
     let image = image_of(61, |x, y| (-((x - 40.0).powi(2) + (y - 30.0).powi(2)) / 8.0).exp());
     let quarter = std::f64::consts::FRAC_PI_2;
     let patch = scale_roll(&image, Pixel::new(30.0, 30.0), 1.0, quarter, 31, Kernel::Bicubic);
@@ -84,7 +84,7 @@ fn positive_roll_turns_content_clockwise_on_screen() {
 
 #[test]
 fn shrinking_smooths_first_so_that_fine_detail_does_not_fold() {
-    // Waves of 2.2 px become 1.1 px at half the scale: only a low-pass keeps them from appearing as 11 px waves.
+    // Waves of 2.2 px become 1.1 px at half the scale: without a low-pass they alias to 11 px waves.
     let wave = |length: f64| move |x: f64, _: f64| 0.5 + 0.4 * (std::f64::consts::TAU * x / length).cos();
     let centre = Pixel::new(60.0, 60.0);
     let shrunk =
@@ -92,7 +92,7 @@ fn shrinking_smooths_first_so_that_fine_detail_does_not_fold() {
     let every_second = extract(&image_of(121, wave(2.2)), centre, 10, Kernel::Bicubic);
     assert!(shrunk(2.2).std().unwrap() < 0.2 * every_second.std().unwrap());
     assert!(shrunk(20.0).std().unwrap() > 0.9 * 0.4 / 2.0_f64.sqrt());
-    // A gentle shrink changes the mean level nowhere.
+    // A gentle shrink leaves the mean unchanged everywhere.
     let flat = scale_roll(&image_of(121, |_, _| 0.3), centre, 0.8, 0.2, 21, Kernel::Bicubic);
     assert!(worst(&flat, |_, _| 0.3) < 1e-6 && flat.is_flat());
 }

@@ -3,19 +3,18 @@
 //! ```text
 //! coarse(x, y) = Σ w(i) w(j) fine(2x + i, 2y + j),      w = (1, 4, 6, 4, 1) / 16,   i, j = −2 … 2
 //! ```
-//! The pixel (x, y) of a level lies on the pixel (2x, 2y) of the level below, with no half pixel between. The
-//! weights are normalised over the valid pixels inside the image, and a pixel is invalid where the one it
-//! lies on is.
+//! Pixel (x, y) of a level is centred on pixel (2x, 2y) of the level below, without a half-pixel shift. The weights are
+//! normalised over the valid pixels inside the image; a pixel is invalid if the one below its centre is.
 
 use image::Luma;
 
 use super::GrayImage;
 use sightline_geometry::frames::Pixel;
 
-/// The weights to one side and the other of the middle.
+/// Weights of the five taps.
 const WEIGHTS: [f64; 5] = [1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0];
 
-/// The image at half the size: a side of n px becomes one of ⌈n/2⌉.
+/// Halves the image: a side of n px becomes ⌈n/2⌉.
 pub fn halve(image: &GrayImage) -> GrayImage {
     let (width, height) = (image.width().div_ceil(2), image.height().div_ceil(2));
     let (columns, rows) = (i64::from(image.width()), i64::from(image.height()));
@@ -38,7 +37,7 @@ pub fn halve(image: &GrayImage) -> GrayImage {
     })
 }
 
-/// The image and its halves, finest first: `levels` of them in all.
+/// The image and its successive halves, finest first: at most `levels` in all.
 pub fn pyramid(image: GrayImage, levels: usize) -> Vec<GrayImage> {
     let mut all = vec![image];
     while all.len() < levels {
@@ -50,13 +49,13 @@ pub fn pyramid(image: GrayImage, levels: usize) -> Vec<GrayImage> {
     all
 }
 
-/// Where a pixel of the finest level lies `level` levels above.
+/// Position of a pixel of the finest level, `level` levels above.
 pub fn at_level(pixel: Pixel, level: usize) -> Pixel {
     let scale = f64::from(1_u32 << level);
     Pixel::new(pixel.x / scale, pixel.y / scale)
 }
 
-/// A weighted sum and the weights that took part.
+/// A weighted sum and the sum of its weights.
 #[derive(Clone, Copy, Default)]
 struct Weighted {
     value: f64,
@@ -64,12 +63,12 @@ struct Weighted {
 }
 
 impl Weighted {
-    /// One pixel; an invalid one counts nothing.
+    /// One pixel; an invalid one has weight 0.
     fn of(value: f32) -> Self {
         if value.is_finite() { Self { value: f64::from(value), weight: 1.0 } } else { Self::default() }
     }
 
-    /// The sum over what there is at offsets −2 to 2.
+    /// The sum over the existing offsets from −2 to 2.
     fn sum(near: impl Fn(i64) -> Option<Self>) -> Self {
         (-2..=2).zip(WEIGHTS).fold(Self::default(), |sum, (i, weight)| match near(i) {
             Some(one) => {

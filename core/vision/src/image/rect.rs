@@ -1,13 +1,13 @@
 //! Rectangles of whole pixels: search windows, subframes, regions of interest.
 //!
-//! `x` and `y` name the first pixel, so the centres of the pixels span [x, x + width − 1] × [y, y + height − 1].
+//! `x` and `y` are the first pixel, so the centres of the pixels span [x, x + width − 1] × [y, y + height − 1].
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use sightline_geometry::frames::Pixel;
 
-/// A rectangle of whole pixels; it may reach over the border of an image.
+/// A rectangle of whole pixels; it may extend over the border of an image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
 pub struct PixelRect {
     /// Column of the first pixel, px.
@@ -31,26 +31,26 @@ impl PixelRect {
         Self::new(0, 0, width, height)
     }
 
-    /// The square of `size` × `size` pixels whose middle lies nearest to `centre`.
+    /// The square of `size` × `size` pixels with its centre nearest to `centre`.
     pub fn centred(centre: Pixel, size: u32) -> Self {
         let half = (f64::from(size) - 1.0) / 2.0;
         Self::new((centre.x - half).round() as i32, (centre.y - half).round() as i32, size, size)
     }
 
-    /// The pixels that both rectangles hold; `None` when there are none.
+    /// The intersection of both rectangles; `None` if it is empty.
     pub fn intersect(&self, other: &Self) -> Option<Self> {
         let (x, width) = overlap((self.x, self.width), (other.x, other.width))?;
         let (y, height) = overlap((self.y, self.height), (other.y, other.height))?;
         Some(Self { x, y, width, height })
     }
 
-    /// The middle, px; it lies between pixels when a side is even.
+    /// The centre, px; between pixels if a side is even.
     pub fn centre(&self) -> Pixel {
         let middle = |start: i32, length: u32| f64::from(start) + (f64::from(length) - 1.0) / 2.0;
         Pixel::new(middle(self.x, self.width), middle(self.y, self.height))
     }
 
-    /// Whether the pixel that holds `at` belongs to the rectangle.
+    /// Returns whether the pixel nearest to `at` is in the rectangle.
     pub fn contains(&self, at: Pixel) -> bool {
         let within = |v: f64, start: i32, length: u32| {
             let v = v.round() - f64::from(start);
@@ -65,7 +65,7 @@ impl PixelRect {
     }
 }
 
-/// Start and length of what two spans share; wide integers, because a rectangle may end beyond `i32::MAX`.
+/// Start and length of the intersection of two spans; in `i64`, because a rectangle may end beyond `i32::MAX`.
 fn overlap(a: (i32, u32), b: (i32, u32)) -> Option<(i32, u32)> {
     let end = |(start, length): (i32, u32)| i64::from(start) + i64::from(length);
     let start = a.0.max(b.0);

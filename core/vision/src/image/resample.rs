@@ -1,13 +1,13 @@
-//! Images read at many places at once: windows, warped windows, and strips along a curve.
+//! Sampling of an image at many positions: windows, warped windows, and strips along a curve.
 //!
-//! Every value is that of [`Kernel::sample`] up to rounding. Nearly all places lie so far inside that the sixteen
-//! taps of the cubic exist and are valid; these are summed column by column in `f64`,
+//! Every value equals [`Kernel::sample`] up to rounding. At nearly all positions the sixteen taps of the cubic exist and
+//! are valid; these are summed column by column in `f64`,
 //! ```text
 //! I(x, y) = Σ_c w_c(x) Σ_r w_r(y) p(r, c)
 //! ```
-//! four columns side by side in vector registers, in an order that never changes. The others, at the border or
-//! touching an invalid pixel, go to [`Kernel::sample`], which knows those rules. At a whole pixel every kernel gives
-//! the pixel itself, so that a window there is a copy.
+//! four columns side by side in vector registers, in a fixed order. The others, at the border or touching an invalid
+//! pixel, are delegated to [`Kernel::sample`]. At a whole pixel every kernel returns the pixel itself, so that a window
+//! there is a copy.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -21,7 +21,8 @@ use super::GrayImage;
 use super::sample::{Kernel, cubic_weights};
 use sightline_geometry::frames::Pixel;
 
-/// `image` at `place(u, v)` for every pixel (u, v) of a picture of `width` × `height` px; NaN where it cannot be read.
+/// Samples `image` at `place(u, v)` for every pixel (u, v) of an output of `width` × `height` px; NaN where it has no
+/// value.
 pub fn at_places(
     image: &GrayImage,
     [width, height]: [u32; 2],
@@ -35,7 +36,7 @@ pub fn at_places(
     GrayImage::from_raw(width, height, values).unwrap_or_default()
 }
 
-/// The square window of side 2·half + 1 about `centre` whose offset o takes `centre + map o`.
+/// The square window of side 2·half + 1 about `centre` that samples `centre + map o` at offset o.
 pub fn window(image: &GrayImage, centre: Pixel, map: &Matrix2<f64>, half: u32, kernel: Kernel) -> GrayImage {
     let (size, half_px) = (2 * half + 1, f64::from(half));
     if *map == Matrix2::identity() && centre.x.fract() == 0.0 && centre.y.fract() == 0.0 {
@@ -50,7 +51,7 @@ pub fn window(image: &GrayImage, centre: Pixel, map: &Matrix2<f64>, half: u32, k
 /// The pixels of the square of side `size` whose first one is the whole pixel `first`.
 fn copy(image: &GrayImage, first: Pixel, size: u32) -> GrayImage {
     let (width, height) = (i64::from(image.width()), i64::from(image.height()));
-    // Beyond 2⁶² there is no image either.
+    // The cast saturates; an image cannot be that large.
     let (left, top) = (first.x as i64, first.y as i64);
     let mut values = vec![f32::NAN; size as usize * size as usize];
     for (v, out) in (0..).zip(values.chunks_exact_mut((size as usize).max(1))) {
@@ -65,7 +66,7 @@ fn copy(image: &GrayImage, first: Pixel, size: u32) -> GrayImage {
     GrayImage::from_raw(size, size, values).unwrap_or_default()
 }
 
-/// Reads all places with the widest vectors of the processor.
+/// Samples all positions with the widest vectors of the processor.
 struct Fill<'a, F> {
     image: &'a GrayImage,
     width: u32,
@@ -91,11 +92,11 @@ impl<F: Fn(u32, u32) -> Pixel> WithSimd for Fill<'_, F> {
     }
 }
 
-/// The places of an image where all sixteen taps of the cubic exist.
+/// The positions of an image at which all sixteen taps of the cubic exist.
 struct Interior<'a> {
     pixels: &'a [f32],
     stride: usize,
-    /// Places lie below these, and at 1 or above.
+    /// Upper bounds of the positions, exclusive; the lower bound is 1.
     end: [f64; 2],
 }
 
@@ -108,7 +109,7 @@ impl<'a> Interior<'a> {
         }
     }
 
-    /// The bicubic value; NaN outside, and beside an invalid pixel.
+    /// The bicubic value; NaN outside the interior and beside an invalid pixel.
     #[inline(always)]
     fn bicubic(&self, at: Pixel) -> f32 {
         if !(at.x >= 1.0 && at.y >= 1.0 && at.x < self.end[0] && at.y < self.end[1]) {
@@ -117,7 +118,7 @@ impl<'a> Interior<'a> {
         let (column, row) = (at.x as i32, at.y as i32);
         let x_weights = cubic_weights(at.x - f64::from(column));
         let y_weights = cubic_weights(at.y - f64::from(row));
-        // Inside the image nothing can overflow.
+        // Indices inside the image cannot overflow.
         let above = (row as usize).wrapping_sub(1).wrapping_mul(self.stride);
         let Some(rows) = self.pixels.get(above.wrapping_add(column as usize).wrapping_sub(1)..) else {
             return f32::NAN;

@@ -1,4 +1,4 @@
-//! Interpolated reading of images at sub-pixel positions.
+//! Interpolation of images at sub-pixel positions.
 //!
 //! Bicubic is the interpolating cubic convolution of Keys (1981) with a = −0.5 (Catmull–Rom), which reproduces
 //! polynomials up to the second degree exactly:
@@ -6,11 +6,11 @@
 //! w(t) = (a+2)|t|³ − (a+3)|t|² + 1            |t| ≤ 1
 //! w(t) = a|t|³ − 5a|t|² + 8a|t| − 4a      1 < |t| < 2
 //! ```
-//! **At the border.** Values exist between the centres of the outermost pixels, [0, W − 1] × [0, H − 1]; beyond
-//! them (the outer half pixel included) the answer is `None`. Where a tap of the cubic lies outside the image it
-//! is continued by Keys' boundary condition f₋₁ = 3f₀ − 3f₁ + f₂, which keeps the second degree; images with
-//! fewer than three columns or rows are read bilinearly. A tap with weight zero is not touched, so a whole
-//! pixel is readable next to an invalid one.
+//! **At the border.** Values exist between the centres of the outermost pixels, [0, W − 1] × [0, H − 1]; outside
+//! (including the outer half pixel) the result is `None`. A tap of the cubic outside the image is extrapolated by Keys'
+//! boundary condition f₋₁ = 3f₀ − 3f₁ + f₂, which preserves the second degree; images with fewer than three columns or
+//! rows are interpolated bilinearly. Taps with weight zero are not read, so a whole pixel next to an invalid one has a
+//! value.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -22,7 +22,7 @@ use utoipa::ToSchema;
 use super::GrayImage;
 use sightline_geometry::frames::Pixel;
 
-/// How an image is read between its pixels.
+/// Interpolation kernel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Kernel {
@@ -60,7 +60,7 @@ pub fn bicubic(image: &GrayImage, at: Pixel) -> Option<f32> {
     weighted(image, (x, &x_weights), (y, &y_weights))
 }
 
-/// The pixel before the position and the fraction beyond it; the last pixel is the end of the last cell.
+/// The pixel before the position and the fraction beyond it; the last pixel belongs to the last cell.
 fn cell(position: f64, length: u32) -> Option<(u32, f64)> {
     if !(position >= 0.0 && position <= f64::from(length) - 1.0) {
         return None;
@@ -73,14 +73,13 @@ fn cell(position: f64, length: u32) -> Option<(u32, f64)> {
 const CUBIC: [[f64; 4]; 4] =
     [[0.0, 1.0, 0.0, 0.0], [-0.5, 0.0, 0.5, 0.0], [1.0, -2.5, 2.0, -0.5], [-0.5, 1.5, -1.5, 0.5]];
 
-/// Weights of the four taps of the cubic around a position that is the fraction `t` beyond the second one; side by
-/// side, so that they take one vector register.
+/// Weights of the four taps of the cubic around a position at the fraction `t` beyond the second one, as one vector.
 #[inline(always)]
 pub(super) fn cubic_weights(t: f64) -> [f64; 4] {
     std::array::from_fn(|i| CUBIC[0][i] + t * (CUBIC[1][i] + t * (CUBIC[2][i] + t * CUBIC[3][i])))
 }
 
-/// First tap and weights of the cubic along one axis, continued over the border by Keys' condition.
+/// First tap and weights of the cubic along one axis, extrapolated over the border by Keys' condition.
 fn cubic_taps(position: f64, length: u32) -> Option<(u32, [f64; 4])> {
     let (before, t) = cell(position, length)?;
     let mut w = cubic_weights(t);
@@ -95,7 +94,7 @@ fn cubic_taps(position: f64, length: u32) -> Option<(u32, [f64; 4])> {
     Some((first as u32, w))
 }
 
-/// Sum over the taps; those with weight zero are neither read nor need to exist.
+/// Sum over the taps; those with weight zero are not read and need not exist.
 fn weighted(image: &GrayImage, (x, wx): (u32, &[f64]), (y, wy): (u32, &[f64])) -> Option<f32> {
     let (width, pixels) = (image.width() as usize, image.as_raw().as_slice());
     let mut sum = 0.0;

@@ -1,4 +1,4 @@
-//! Tests of the interpolated reading: polynomials reproduced, borders, invalid pixels.
+//! Tests of the interpolation: polynomials, borders, invalid pixels.
 
 use super::*;
 
@@ -44,7 +44,7 @@ fn bicubic_of_a_cubic_errs_by_the_third_order_and_is_exact_half_way() {
     let image = image_of(12, 12, |x, _| x * x * x / 1000.0);
     for (x, exact) in [(5.0, true), (5.5, true), (5.25, false)] {
         let error = f64::from(bicubic(&image, Pixel::new(x, 6.0)).unwrap()) - x * x * x / 1000.0;
-        // Central differences overstate the slope of x³ by 1 at both ends, which adds t(1−t)(1−2t) = 0.09375.
+        // Central differences overestimate the slope of x³ by 1 at both ends, which adds t(1−t)(1−2t) = 0.09375.
         let expected = if exact { 0.0 } else { 0.093_75e-3 };
         assert!((error.abs() - expected).abs() < 1e-6, "at {x}: {error}");
     }

@@ -1,11 +1,11 @@
-//! Whether a registration is to be used: its numbers against the limits.
+//! Verdict on a registration: compares its numbers with the limits.
 //!
 //! ```text
-//! misfit = √( mean of min( (r_i/σ_i)², 5² ) )        1 where the noise of both surfaces explains all
+//! misfit = √( mean of min( (r_i/σ_i)², 5² ) )        1 if the noise of both surfaces explains the residuals
 //! ```
-//! The cut keeps single wrong points of stereo from deciding; a rock that is not there fills whole regions and is
-//! seen. The mean, not the median, because the ground around a wrong rock fits. Six parameters can make a wrong rock fit by
-//! turning it away: the start's attitude comes from the rover's own and bounds that (R198: it is "about right").
+//! The cut limits the effect of single outliers of stereo; a missing rock affects whole regions and is detected. The
+//! mean is used instead of the median because the ground around a wrong rock fits. Six parameters can make a wrong rock
+//! fit by rotating it; the start's attitude is the rover's own and bounds the rotation (R198: it is "about right").
 //!
 //! Source: ours; R196 for the overlap.
 
@@ -14,10 +14,10 @@ use super::pairs::Pair;
 use super::settings::CheckSettings;
 use super::{Registration, RegistrationInput};
 
-/// Residuals beyond so many of their standard deviations count as that.
+/// Residuals are clamped to this many standard deviations.
 const CUT: f64 = 5.0;
 
-/// What is wrong with the surfaces before anything is done with them.
+/// Checks the input surfaces; returns the reason if one is unusable.
 pub(super) fn surfaces(input: &RegistrationInput<'_>, limits: &CheckSettings) -> Option<Failure> {
     for (mesh, side) in [(input.fixed, Side::Fixed), (input.moving, Side::Moving)] {
         let triangles = mesh.triangles.len();
@@ -31,7 +31,7 @@ pub(super) fn surfaces(input: &RegistrationInput<'_>, limits: &CheckSettings) ->
     None
 }
 
-/// How many times the surfaces differ as much as their noise explains; none where no noise is known.
+/// RMS residual over its predicted σ; `None` without a noise model.
 pub(super) fn misfit(pairs: &[Pair]) -> Option<f64> {
     let known = pairs.iter().filter(|pair| pair.sigma_m < 1.0);
     let (mut squares, mut count) = (0.0, 0);
@@ -42,7 +42,7 @@ pub(super) fn misfit(pairs: &[Pair]) -> Option<f64> {
     (count > 0).then(|| (squares / f64::from(count)).sqrt())
 }
 
-/// The first reason that speaks against a result.
+/// Returns the first reason to reject a result.
 pub(super) fn result(
     registration: &Registration,
     limits: &CheckSettings,

@@ -1,18 +1,18 @@
-//! The coarse search: the moving mesh pushed across the fixed one, pixel by pixel of the sensor (R198–R200).
+//! The coarse search: shifts the moving mesh across the fixed one in steps of one pixel of the sensor (R198–R200).
 //!
 //! ```text
 //! t  = x c_x + y c_y + z c_z                                                        D-Eq 13
 //! Δz = median_i( z_i − h_i(x₀ + Δx, y₀ + Δy, z₀, r₀) )                              D-Eq 14 with E24
 //! J(Δx, Δy) = 1/n Σ_i | h_i + Δz − z_i |      over the n common pixels, at least overlap_min of the fixed surface's
 //! ```
-//! Turns are taken from the start, which is about right. For an orthographic sensor h at a shift by whole pixels is the
-//! picture at no shift, read elsewhere: the mesh is drawn once, on a picture wider by the range of the search. A
-//! pinhole draws it anew for each shift, pushed by a pixel's width at the depth of the target.
+//! The rotation is that of the start, which is about right. For an orthographic sensor, h at a shift by whole pixels is
+//! the unshifted depth map read at other pixels: the mesh is rendered once, to an image widened by the search range. For
+//! a pinhole it is rendered for each shift; a step is a pixel's width at the depth of the target.
 //!
-//! The search reads every second pixel of every second row: 1,000 of 64 × 64, more than the shape of a rock needs.
+//! The search reads every second pixel of every second row: about 1,000 of 64 × 64, more than the shape of a rock needs.
 //!
-//! **Isolation.** Of the other minima of J, at least `apart_m` from the best, the lowest is kept: where it is nearly as
-//! low, the surfaces fit in two places.
+//! **Isolation.** `other` is the lowest minimum of J at least `apart_m` from the best; if it is nearly as low, the
+//! surfaces fit in two places.
 //!
 //! | symbol | our name | unit, frame |
 //! |---|---|---|
@@ -31,59 +31,59 @@ use super::rasterise::{Depths, Facets, Picture, rasterise};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::Point3;
 
-/// Every so many pixels of a row, and rows, are compared.
+/// Stride of the compared pixels, in x and in y.
 const EVERY: usize = 2;
 
 /// J over all shifts of the search.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CoarseSurface {
-    /// Steps to each side; the surface has 2 · this + 1 rows and columns, the first row at the least Δy.
+    /// Steps to each side; the map has 2 · this + 1 rows and columns, the first row at the least Δy.
     pub steps: usize,
     /// Shift from step to step, m.
     pub step_m: f64,
-    /// J, m, row by row; infinite where too little overlaps.
+    /// J, m, row by row; infinite where the overlap is too small.
     pub mean_m: Vec<f32>,
-    /// Δz, m, alike; 0 where nothing overlaps.
+    /// Δz, m, in the same order; 0 without overlap.
     pub shift_m: Vec<f32>,
-    /// The largest share of the fixed surface's pixels that any shift covers.
+    /// Largest fraction of the fixed surface's pixels that any shift covers.
     pub overlap_best: f64,
-    /// Where J is least; none where nothing overlaps enough.
+    /// Minimum of J; `None` if no shift has enough overlap.
     pub best: Option<Minimum>,
-    /// The lowest other minimum that is far enough from it.
+    /// The lowest other minimum that is far enough from `best`.
     pub other: Option<Minimum>,
 }
 
-/// A minimum of the coarse surface.
+/// A minimum of J over the shifts.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Minimum {
     /// Δx, Δy, Δz, m, sensor.
     pub shift_m: [f64; 3],
     /// J, m.
     pub mean_m: f64,
-    /// Whether it lies on the border of the search.
+    /// Whether it is on the border of the search.
     pub is_at_edge: bool,
 }
 
 impl Minimum {
-    /// As an offset without a turn.
+    /// Returns the shift as an offset without rotation.
     pub fn offset(&self) -> Offset {
         let [x, y, z] = self.shift_m;
         Offset::new(x, y, z, 0.0, 0.0, 0.0)
     }
 }
 
-/// What the search compares.
+/// Input of the coarse search.
 #[derive(Clone, Copy)]
 pub(super) struct CoarseInput<'a> {
     pub(super) sensor: &'a RangeSensor,
-    /// z, m; infinite where nothing is seen.
+    /// z, m; infinite where the fixed surface does not cover the pixel.
     pub(super) fixed_m: &'a [f32],
-    /// The moving mesh at its start.
+    /// The moving mesh at its start, in the sensor's frame.
     pub(super) facets: &'a Facets,
     pub(super) pivot: Point3,
-    /// How far to each side, m.
+    /// Half range of the search, m.
     pub(super) half_range_m: f64,
-    /// How far minima must be apart to be two, m.
+    /// Least distance between separate minima, m.
     pub(super) apart_m: f64,
     pub(super) overlap_min: f64,
     /// Once requested, no further shift is compared.
@@ -91,13 +91,13 @@ pub(super) struct CoarseInput<'a> {
 }
 
 impl CoarseInput<'_> {
-    /// A row of shifts that were not compared, once the result is not wanted any more.
+    /// Returns a row of shifts without overlap once cancellation is requested.
     fn cancelled_row(&self, side: usize) -> Option<Vec<(Agreement, f32)>> {
         self.cancel.is_requested().then(|| vec![(agreement(0.0, 0, 1, self.overlap_min), 0.0); side])
     }
 }
 
-/// J over all shifts, and its minima.
+/// Computes J over all shifts, and its minima.
 pub(super) fn coarse_register(input: &CoarseInput<'_>) -> CoarseSurface {
     let step_m = input.sensor.pixel_m(input.pivot.z);
     let steps = (input.half_range_m / step_m).round().max(1.0) as usize;
@@ -118,7 +118,7 @@ pub(super) fn coarse_register(input: &CoarseInput<'_>) -> CoarseSurface {
     surface
 }
 
-/// The pixels that are compared.
+/// Indices and depths of the pixels to compare.
 fn compared(sensor: &RangeSensor, fixed_m: &[f32]) -> Vec<(usize, f32)> {
     let is_compared = |&pixel: &usize| {
         (pixel % sensor.width).is_multiple_of(EVERY)
@@ -128,13 +128,13 @@ fn compared(sensor: &RangeSensor, fixed_m: &[f32]) -> Vec<(usize, f32)> {
     (0..fixed_m.len()).filter(is_compared).map(|pixel| (pixel, fixed_m[pixel])).collect()
 }
 
-/// J and Δz of all shifts from one picture of the mesh.
+/// J and Δz of all shifts from one rendered depth map (orthographic sensor).
 fn by_reading(input: &CoarseInput<'_>, steps: usize) -> Vec<(Agreement, f32)> {
     let wide = input.sensor.widened(steps);
     let mut moving_m = vec![f32::INFINITY; wide.width * wide.height];
     let still = motion(&Offset::zeros(), &input.pivot);
     rasterise(&wide, input.facets, &still, &mut Picture::default(), &mut Depths(&mut moving_m));
-    // Where a pixel lies in the wide picture at the shift by −steps, which reads farthest to the right and below.
+    // Index of each pixel in the wide image at the shift by −steps, which reads farthest to the right and below.
     let width = input.sensor.width;
     let pixels: Vec<(usize, f32)> = compared(input.sensor, input.fixed_m)
         .into_iter()
@@ -159,7 +159,7 @@ fn by_reading(input: &CoarseInput<'_>, steps: usize) -> Vec<(Agreement, f32)> {
     (0..side).into_par_iter().flat_map_iter(row).collect()
 }
 
-/// J and Δz of all shifts, the mesh drawn anew for each.
+/// J and Δz of all shifts, rendering the mesh for each (pinhole).
 fn by_drawing(input: &CoarseInput<'_>, steps: usize, step_m: f64) -> Vec<(Agreement, f32)> {
     let pixels = compared(input.sensor, input.fixed_m);
     let side = 2 * steps + 1;
@@ -192,7 +192,7 @@ fn cell(differences_m: &mut [f32], pixels: usize, overlap_min: f64) -> (Agreemen
         return (agreement(0.0, 0, pixels, overlap_min), 0.0);
     }
     let (below, &mut shift_m, above) = differences_m.select_nth_unstable_by(count / 2, f32::total_cmp);
-    // On either side of the median all differences have one sign.
+    // On either side of the median, all differences have the same sign.
     let low: f32 = below.iter().map(|difference| shift_m - difference).sum();
     let high: f32 = above.iter().map(|difference| difference - shift_m).sum();
     (agreement(f64::from(low + high), count, pixels, overlap_min), shift_m)
@@ -214,7 +214,7 @@ impl CoarseSurface {
         }
     }
 
-    /// Whether no neighbour of a cell is lower.
+    /// Returns whether no neighbour of a cell is lower.
     fn is_minimum(&self, cell: usize) -> bool {
         let side = self.side();
         let (i, j) = (cell % side, cell / side);

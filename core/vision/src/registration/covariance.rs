@@ -1,31 +1,32 @@
-//! How well a registration is known: its covariance, from the shape and from what its residuals are like (R179).
+//! Covariance of a registration, from the shape and from the statistics of its residuals (R179).
 //!
 //! ```text
-//! A = Σ w_i ½ (J_i^f J_i^mᵀ + J_i^m J_i^fᵀ)                    J by the normal of the fixed and of the moving surface
+//! A = Σ w_i ½ (J_i^f J_i^mᵀ + J_i^m J_i^fᵀ)                    J with the normal of the fixed and of the moving surface
 //! point to plane  w = 1/σ_i²                                    P = s² κ A⁻¹
 //! L1 of depths    w = √(2/π) / (s σ_i) · slant⁻¹,  B = Σ κ₁ J Jᵀ / slant²           P = A⁻¹ B A⁻¹
-//! κ  = Σ over lags of the autocorrelation of r_i / σ_i          κ₁ the same of its signs
+//! κ  = Σ over lags of the autocorrelation of r_i / σ_i          κ₁ the same for their signs
 //! P_target = [I, −[d]×] P [I, −[d]×]ᵀ + σ_common² I             d = target − c
 //! ```
-//! **Shape that only noise has.** Noise tilts normals at random, so that flat ground would seem to hold a shift along it
-//! by its own noise. The two surfaces do not share their noise: products of one's gradient with the other's have no
-//! such part on average. What is left of it by chance can make A indefinite; then there is not enough shape.
+//! **Shape that is only noise.** Noise tilts normals at random, so that flat ground would seem to constrain a shift
+//! along it. The noise of the two surfaces is independent: products of one's gradient with the other's have no such
+//! bias. Their random part can make A indefinite; there is then not enough shape.
 //!
-//! **How many residuals count.** Errors of stereo are alike within a window of correlation, and a surface thinned
-//! differently differs alike over a facet. κ counts how many pixels err together: the autocorrelation of the residuals
-//! themselves is averaged over rings of equal distance and added up to the first ring below 5 %, at most 8 pixels out.
-//! The scale s is measured too (rms of r/σ, cut at 3 of the robust scale): noise that was claimed too small grows.
+//! **Effective number of residuals.** Errors of stereo are correlated within a correlation window, and the error of a
+//! thinned mesh is correlated over a facet. κ is the number of pixels over which residuals are correlated: the
+//! autocorrelation of the residuals is averaged over rings of equal distance and summed up to the first ring below 5 %,
+//! at most 8 pixels out. The scale s is measured too (RMS of r/σ, clamped at 3 robust scales): noise that was claimed
+//! too small grows.
 //!
-//! **What does not average out.** A window of stereo smooths what it sees, more from farther off: a convex rock looks
-//! smaller, and all pixels say so alike. σ_common stands for it ([`super::ShapeSettings::common_sigma_m`]).
+//! **Common error.** A window of stereo smooths the surface, more at longer range: a convex rock appears smaller in all
+//! pixels at once. σ_common accounts for it ([`super::ShapeSettings::common_sigma_m`]).
 //!
 //! | symbol | our name | unit, frame |
 //! |---|---|---|
 //! | P | [`Precision::covariance`] | m², m rad, rad²; sensor, about c |
 //! | s, κ | [`Precision::scale`], [`Precision::alike_px`] | –, px |
 //!
-//! Source: ours (R179 wants a bootstrap of the depth residuals, which takes neighbours as independent); the L1 form is
-//! that of a median: Koenker & Bassett 1978.
+//! Source: ours (R179 asks for a bootstrap of the depth residuals, which treats neighbours as independent); the L1 form
+//! is that of a median: Koenker & Bassett 1978.
 
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, SymmetricEigen};
 use serde::{Deserialize, Serialize};
@@ -37,30 +38,30 @@ use super::settings::Method;
 use super::slopes::Slopes;
 use sightline_geometry::frames::{Point3, Vector3};
 
-/// Farthest lag at which residuals are compared, px.
+/// Largest lag of the autocorrelation, px.
 const LAG_MAX: i32 = 8;
-/// Autocorrelation below which residuals are independent.
+/// Autocorrelation below which residuals are taken as independent.
 const ALIKE_MIN: f64 = 0.05;
-/// A surface seen more edge-on than this counts as if it were not: its normal is not known well enough.
+/// Lower bound of the slant of a surface: the normal of one seen edge-on is too uncertain.
 const SLANT_MIN: f64 = 0.2;
-/// Residuals beyond so many robust scales are drawn in.
+/// Residuals are clamped to this many robust scales.
 const CUT: f64 = 3.0;
 
-/// How well the motion is known.
+/// Precision of a registered motion.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Precision {
-    /// P of (t, ω), m², m rad, rad²: axes of the sensor, about the pivot; none where the shape does not hold the motion.
+    /// P of (t, ω), m², m rad, rad²: axes of the sensor, about the pivot; `None` if the shape does not constrain the
+    /// motion.
     pub covariance: Option<Matrix6<f64>>,
-    /// s: standard deviation of the residuals over that which the surfaces' noise explains; in metres where no noise is
-    /// known.
+    /// s: RMS of the residuals over their predicted σ; in metres without a noise model.
     pub scale: f64,
-    /// κ: pixels that err together.
+    /// κ: number of pixels over which residuals are correlated.
     pub alike_px: f64,
-    /// Pixels that were used.
+    /// Number of pixels where both surfaces have normals.
     pub pixels: usize,
 }
 
-/// The precision of a motion at which the sensor sees `moving` and `pairs` remain.
+/// Computes the precision of a motion from its rendered depth map `moving` and its residuals `pairs`.
 pub(super) fn precision(
     template: &Template,
     moving: &RangeImage,
@@ -100,10 +101,9 @@ pub(super) fn precision(
     Precision { covariance, scale, alike_px, pixels }
 }
 
-/// The covariance of what the surfaces and the start say together. Directions of which the surfaces say less than nothing,
-/// by chance, they say nothing of.
+/// Combines the information of the surfaces with the prior. Negative eigenvalues, which occur by chance, are set to 0.
 fn with_prior(shape: &Matrix6<f64>, held: &Held) -> Option<Matrix6<f64>> {
-    // Metres and radians differ by the size of the rock; in units of the prior all directions are alike.
+    // Metres and radians differ by the size of the rock; in units of the prior's σ all directions are comparable.
     let whitened = held.information.cholesky()?.l();
     let inverse = whitened.try_inverse()?;
     let mut eigen = SymmetricEigen::new(inverse * shape * inverse.transpose());
@@ -132,7 +132,7 @@ fn sums(pairs: &[Pair], slopes: &Slopes, method: Method, scale: f64) -> (Matrix6
     (shape, scatter, pixels)
 }
 
-/// κ of values on a picture, NaN where there are none.
+/// κ of the values of an image; NaN where there are none.
 fn alike_px(values: &[f64], width: usize) -> f64 {
     let height = (values.len() / width.max(1)) as i32;
     let width = width as i32;
@@ -146,7 +146,7 @@ fn alike_px(values: &[f64], width: usize) -> f64 {
             if ring > LAG_MAX as usize || (dy == 0 && dx < 0) {
                 continue;
             }
-            // Lags to the other side are alike.
+            // The autocorrelation is symmetric in the lag.
             lags[ring] += if dx == 0 && dy == 0 { 1 } else { 2 };
             for y in 0..height - dy {
                 for x in (-dx).max(0)..(width - dx.max(0)) {
@@ -179,14 +179,14 @@ pub fn covariance_of_point(covariance: &Matrix6<f64>, arm: &Vector3) -> Matrix3<
     by_offset * covariance * by_offset.transpose()
 }
 
-/// The largest 1σ axis of a covariance, m, and its direction.
+/// Returns the largest 1σ of a covariance, m, and its direction.
 pub fn weakest(covariance: &Matrix3<f64>) -> (f64, Vector3) {
     let eigen = SymmetricEigen::new(*covariance);
     let axis = eigen.eigenvalues.imax();
     (eigen.eigenvalues[axis].max(0.0).sqrt(), eigen.eigenvectors.column(axis).into())
 }
 
-/// The same point, as an offset from the pivot.
+/// Returns the offset of a point from the pivot.
 pub(super) fn arm(point_in_sensor: &Point3, pivot: &Point3) -> Vector3 {
     point_in_sensor - pivot
 }

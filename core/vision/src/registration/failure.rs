@@ -1,31 +1,31 @@
-//! Why a registration is not to be used, as a named reason and a sentence.
+//! Reasons to reject a registration, each with a sentence for the user.
 //!
-//! | reason | what a person would see |
+//! | reason | typical cause |
 //! |---|---|
-//! | `EmptySurface`, `TooFewTriangles` | stereo found nothing there |
-//! | `NoOverlap` | the two meshes lie side by side |
+//! | `EmptySurface`, `TooFewTriangles` | stereo has no points there |
+//! | `NoOverlap` | the two meshes do not overlap in the sensor's image |
 //! | `DoesNotFit` | another rock, or the rock has changed |
-//! | `NotEnoughShape` | flat ground, or a smooth boulder: the mesh slides without getting worse |
-//! | `TurnedAway` | the refinement turned the mesh until something fitted: another rock |
-//! | `NotIsolated` | the coarse surface has two valleys |
-//! | `AtSearchEdge` | the valley goes on beyond the search |
+//! | `NotEnoughShape` | flat ground, or a smooth boulder: the mesh slides without a larger residual |
+//! | `TurnedAway` | the refinement rotated the mesh until it fitted: another rock |
+//! | `NotIsolated` | J of the coarse search has two minima |
+//! | `AtSearchEdge` | the minimum is outside the search range |
 //!
-//! The first that applies is given, in this order: without overlap nothing else means anything; what does not
-//! fit has no place; without shape every place fits alike.
+//! The first reason that applies is reported, in this order: without overlap the other numbers are meaningless; a mesh
+//! that does not fit has no valid position; without shape all positions fit equally well.
 //!
 //! Source: ours; R196 for the overlap.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// Which of the two surfaces.
+/// One of the two surfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = RegisteredView)]
 pub enum Side {
     /// The target's first view.
     Fixed,
-    /// The present view.
+    /// The current view.
     Moving,
 }
 
@@ -38,48 +38,48 @@ impl std::fmt::Display for Side {
     }
 }
 
-/// Why a registration is not to be used; its text is a sentence for a person.
+/// Reason for rejecting a registration.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema, thiserror::Error)]
 #[serde(tag = "reason", rename_all = "snake_case")]
 pub enum Failure {
     /// A surface has no points near the target.
     #[error("the {side} surface has no points near the target")]
     EmptySurface {
-        /// Which.
+        /// The surface without points.
         side: Side,
     },
     /// A surface has too few triangles near the target.
     #[error("the {side} surface has {triangles} triangles near the target, fewer than {least}")]
     TooFewTriangles {
-        /// Which.
+        /// The surface concerned.
         side: Side,
-        /// How many it has.
+        /// Its number of triangles.
         triangles: usize,
-        /// How many are needed.
+        /// The least number required.
         least: usize,
     },
-    /// The surfaces do not cover enough of the same pixels.
+    /// Too few pixels are covered by both surfaces.
     #[error("the surfaces share {:.0} % of the target's pixels, less than {:.0} %", .share * 100.0, .least * 100.0)]
     NoOverlap {
-        /// The largest share that any position gives, or that of the result.
+        /// Largest overlap of the coarse search, or the overlap of the result; a fraction of the fixed surface's pixels.
         share: f64,
-        /// What is needed.
+        /// The least fraction required.
         least: f64,
     },
-    /// The refinement turned farther than the start can be off.
+    /// The refinement rotated by more than the start can be in error.
     #[error("the refinement rotated by {:.1}°, more than {:.1}°", .turn_rad.to_degrees(), .limit_rad.to_degrees())]
     TurnedAway {
-        /// By how much, rad.
+        /// Rotation from the start, rad.
         turn_rad: f64,
-        /// How much is allowed, rad.
+        /// Largest rotation accepted, rad.
         limit_rad: f64,
     },
-    /// The shape lets the target slide.
+    /// The shape does not constrain the target in every direction.
     #[error("target uncertainty after registration: {}; the limit is {limit_m:.3} m", sigma_text(.sigma_m))]
     NotEnoughShape {
-        /// 1σ in the weakest direction, m; none where nothing holds it.
+        /// 1σ in the least constrained direction, m; `None` if that direction is unconstrained.
         sigma_m: Option<f64>,
-        /// What is needed, m.
+        /// Largest 1σ accepted, m.
         limit_m: f64,
     },
     /// The surfaces differ by more than their noise.
@@ -87,9 +87,9 @@ pub enum Failure {
         "the RMS residual of the surfaces is {misfit:.1} times its predicted σ, more than {limit:.1} times"
     )]
     DoesNotFit {
-        /// How many times.
+        /// RMS residual over its predicted σ.
         misfit: f64,
-        /// How many are allowed.
+        /// Largest value accepted.
         limit: f64,
     },
     /// The surfaces fit nearly as well elsewhere.
@@ -97,17 +97,17 @@ pub enum Failure {
         "the surfaces fit {distance_m:.2} m away nearly as well: {ratio:.2} times the difference, less than {least:.2}"
     )]
     NotIsolated {
-        /// How far away, m.
+        /// Distance between the two minima, m.
         distance_m: f64,
-        /// The other's mean difference over that of the best.
+        /// Mean difference at the second minimum over that at the best.
         ratio: f64,
-        /// What is needed.
+        /// Least ratio accepted.
         least: f64,
     },
-    /// The best place is on the border of the coarse search.
+    /// The best shift is on the border of the coarse search.
     #[error("the best fit is on the border of the search, {range_m:.2} m from the start")]
     AtSearchEdge {
-        /// How far the search goes, m.
+        /// Half range of the search, m.
         range_m: f64,
     },
 }

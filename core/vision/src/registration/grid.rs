@@ -1,38 +1,38 @@
-//! Points on a grid as a range instrument gives them: what a mesh is made of (R187).
+//! Points on the grid of a range instrument: the input of a mesh (R187).
 //!
-//! Dense stereo gives one point for every left pixel, or none where it found no partner; a scanner gives a bare cloud,
-//! which is put in order again by the directions in which it was measured. Neighbours in the grid are neighbours in
-//! direction, so that a surface can be laid through them without a search.
+//! Dense stereo gives one point for every left pixel, or none without a match. A scanner gives an unordered cloud, which
+//! is ordered by the directions of measurement. Neighbours in the grid are neighbours in direction, so that a surface
+//! can be laid through them without a search.
 //!
 //! | name | unit, frame |
 //! |---|---|
-//! | [`PointGrid::points`] | m, any frame with its viewpoint in it; for stereo the rover frame |
+//! | [`PointGrid::points`] | m, any frame that also contains the viewpoint; for stereo the rover frame |
 //! | [`PointGrid::range_sigma_m`] | m, 1σ along the line of sight |
 //! | [`Scan::azimuth_rad`], [`Scan::elevation_rad`] | rad, about the z axis and away from the plane across it |
 //!
-//! Source: D§2, "3D shape based tracker"; that bare clouds are taken as well is ours.
+//! Source: D§2, "3D shape based tracker"; support for unordered clouds is ours.
 
 use sightline_geometry::frames::Point3;
 
-/// Points of a surface, row by row as they are seen from one place.
+/// Points of a surface, row by row as seen from one viewpoint.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PointGrid {
     /// Points in a row.
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// `width · height` points, m; none where nothing was measured.
+    /// `width · height` points, m; `None` where nothing was measured.
     pub points: Vec<Option<Point3>>,
-    /// 1σ of each point along its line of sight, m, where it is known; values of missing points mean nothing.
+    /// 1σ of each point along its line of sight, m; `None` if unknown. Entries of missing points are meaningless.
     pub range_sigma_m: Option<Vec<f32>>,
 }
 
-/// How a cloud is put in order: equal steps of azimuth and elevation about its viewpoint.
+/// Order of a cloud: equal steps of azimuth and elevation about its viewpoint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scan {
     /// Columns of the grid.
     pub columns: usize,
-    /// Its rows.
+    /// Rows of the grid.
     pub rows: usize,
     /// Azimuth, atan2(y, x), at the outer edges of the first and the last column, rad.
     pub azimuth_rad: [f64; 2],
@@ -41,28 +41,28 @@ pub struct Scan {
 }
 
 impl PointGrid {
-    /// A grid on which nothing was measured.
+    /// A grid without points.
     pub fn empty(width: usize, height: usize) -> Self {
         Self { width, height, points: vec![None; width * height], range_sigma_m: None }
     }
 
-    /// The point at a column and a row, m.
+    /// Returns the point at a column and a row, m.
     pub fn at(&self, x: usize, y: usize) -> Option<&Point3> {
         self.points.get(y * self.width + x)?.as_ref()
     }
 
-    /// 1σ of a point along its line of sight, m; 0 where it is not known.
+    /// Returns 1σ of a point along its line of sight, m; 0 where unknown.
     pub fn sigma_at(&self, x: usize, y: usize) -> f32 {
         self.range_sigma_m.as_ref().and_then(|sigma| sigma.get(y * self.width + x)).copied().unwrap_or(0.0)
     }
 
-    /// How many points there are.
+    /// Number of points.
     pub fn count(&self) -> usize {
         self.points.iter().flatten().count()
     }
 
-    /// Puts a cloud in order as `scan` says; of several points in one place the nearest stays, points beside it are left
-    /// out. All in one frame, m.
+    /// Orders a cloud by `scan`. The nearest of several points in one cell is kept; points outside the scan are dropped.
+    /// All coordinates in one frame, m.
     pub fn from_cloud(cloud: &[Point3], viewpoint: &Point3, scan: &Scan) -> Self {
         let mut grid = Self::empty(scan.columns, scan.rows);
         let place = |value: f64, [first, last]: [f64; 2], count: usize| {

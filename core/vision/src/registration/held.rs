@@ -1,11 +1,11 @@
-//! What is known of the motion before the surfaces are compared, as a pull towards the start.
+//! Prior of a registration's motion, as a quadratic penalty on the offset from the start.
 //!
 //! ```text
 //! minimise   Σ ρ(r_i / s σ_i) / (s² κ)  +  pᵀ Λ p         Λ = diag( (R Σ_target Rᵀ)⁻¹, I / σ_a² )
 //! ```
-//! A flat face lets a rock slide and a round one lets it roll; where features or a rover that did not move say how it
-//! lies, the surfaces need only tell the rest. κ pixels err together, so that so many of them count as one: without it
-//! the surfaces would overrule everything.
+//! A flat face lets a mesh slide and a round one lets it rotate; a prior from features or from a rover at rest
+//! constrains those directions. Residuals are correlated over κ pixels, so the information of the surfaces is divided by
+//! κ; without that it would dominate the prior.
 //!
 //! | symbol | our name | unit, frame |
 //! |---|---|---|
@@ -14,7 +14,7 @@
 //! | R | `sensor_from_moving` at the start | – |
 //! | κ | `alike_px` | px |
 //!
-//! Source: ours; R197 gives the start without saying how well it is known.
+//! Source: ours; R197 gives the start without its uncertainty.
 
 use nalgebra::Matrix6;
 
@@ -22,17 +22,17 @@ use super::RegistrationInput;
 use super::objective::Offset;
 use super::range_sensor::RangeSensor;
 
-/// Pixels that err together, before that is measured.
+/// κ before it is measured, px.
 const ALIKE_PX: f64 = 20.0;
-/// The least variance of a coordinate of the target, m²: 0.1 mm.
+/// Least variance of a coordinate of the target, m²; 1σ = 0.1 mm.
 const VARIANCE_MIN_M2: f64 = 1e-8;
 
-/// The pull towards the start.
+/// Prior of the offset from the start.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Held {
-    /// Λ; 0 where nothing is known.
+    /// Λ; 0 without a prior.
     pub(super) information: Matrix6<f64>,
-    /// κ.
+    /// κ: number of pixels over which residuals are correlated.
     pub(super) alike_px: f64,
 }
 
@@ -54,12 +54,13 @@ impl Held {
         held
     }
 
-    /// Whether nothing is known.
+    /// Returns whether there is no prior.
     pub(super) fn is_free(&self) -> bool {
         self.information == Matrix6::zeros()
     }
 
-    /// What it adds to the normal equations of residuals whose scale is s: the matrix, and the pull at an offset.
+    /// Returns the terms that the prior adds to the normal equations of residuals with scale s: matrix and right-hand
+    /// side.
     pub(super) fn pull(&self, at: &Offset, scale: f64) -> (Matrix6<f64>, Offset) {
         let information = self.information * (scale * scale * self.alike_px);
         (information, -(information * at))

@@ -1,7 +1,7 @@
-//! Two scans of a street with a known motion beside another program's registration of them
-//! (`tests/reference/lidar_registration.py` wrote the numbers and says how).
+//! Registers two lidar scans of a street with a known motion and compares the errors with those of another program;
+//! `tests/reference/lidar_registration.py` wrote and describes its numbers.
 //!
-//! A test whose data are missing is left out (see `sightline_testdata`).
+//! The test is skipped if its data are missing (see `sightline_testdata`).
 
 use std::path::Path;
 
@@ -13,10 +13,10 @@ use super::*;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::Vector3;
 
-/// What the other program reached.
+/// Errors of the other program.
 #[derive(Deserialize)]
 struct Reference {
-    /// The middle of the part of the horizon, deg; none: all around.
+    /// Centre of the sector of azimuth, deg; `None`: all around.
     centre_deg: Option<f64>,
     error_mm: f64,
     error_mrad: f64,
@@ -45,7 +45,7 @@ fn motion_of(path: &Path) -> Pose {
     Pose::from_parts(shift, UnitQuaternion::from_matrix(&turn))
 }
 
-/// 32 rings, 4/3° apart, at half of their columns; rings lie far apart on the ground, which the ratio of ranges allows for.
+/// 32 rings, 4/3° apart, at half of their columns; rings on the ground are far apart, hence the large ratio of ranges.
 fn mesh(cloud: &[Point3]) -> Mesh {
     let pi = std::f64::consts::PI;
     let scan = Scan {
@@ -95,7 +95,7 @@ fn a_street_is_registered_about_as_well_as_by_another_program() {
                 "{centre_deg}° {method:?}: {error_mm:.1} mm, {error_mrad:.1} mrad (the other program {} and {}), {:?}",
                 part.error_mm, part.error_mrad, found.failure
             );
-            // The scans are 504 mm and 12.5 mrad apart; the car moved while a quarter was scanned.
+            // The scans are 504 mm and 12.5 mrad apart; the car moved during each scan.
             assert!(error_mm < part.error_mm.max(20.0) * 1.7, "{centre_deg}° {method:?} {error_mm}");
             assert!(error_mrad < part.error_mrad + 5.0, "{centre_deg}° {method:?} {error_mrad}");
         }

@@ -1,19 +1,19 @@
-//! The mesh of a surface: triangles between neighbours of a point grid, cut where the depth jumps (R188).
+//! Mesh of a surface: triangles between neighbours of a point grid, cut at depth discontinuities (R188).
 //!
 //! ```text
 //! vertex of a block of s × s points:  o + r̃ · mean of the unit directions          r̃ the median of the ranges
 //! triangle (i, j, k):   max r / min r ≤ 1.05    and    angle between normal and line of sight ≤ 80°
-//! error of the detail:  range of every point − range of the mesh in its direction
+//! error of thinning:    range of every point − range of the mesh in its direction
 //! ```
-//! A cell of four vertices is split along its shorter diagonal; where one is missing the other three may still be joined.
-//! All triangles go round clockwise as the viewpoint sees them; what a sensor sees from behind is no surface.
+//! A cell of four vertices is split along its shorter diagonal; if one is missing, the other three may still form a
+//! facet. All triangles are clockwise as seen from the viewpoint, which allows the rasteriser to cull back faces.
 //!
-//! **Level of detail.** A vertex stands for s × s points. Its range is their median, not their mean: a block across an
-//! edge keeps to one side, and single wrong points do not count. s follows from the wanted spacing of vertices. What
-//! the coarser mesh loses is measured ([`Mesh::detail`]): the rms, with the noise of the points in it.
+//! **Level of detail.** A vertex represents s × s points. Its range is their median, not their mean: a block across a
+//! depth edge takes one side of it, and single outliers have no effect. s follows from the wanted spacing of vertices.
+//! [`Mesh::detail`] measures the RMS error of thinning, which includes the noise of the points.
 //!
-//! **Ours beyond the paper**: the numbers of the cut (R188); the second condition, because a rim that stands before
-//! ground only a few centimetres behind would else be joined to it by facets that nobody saw.
+//! **Ours beyond the paper**: the limits of the cut (R188); the limit of the angle, because facets would otherwise join
+//! a rim to ground a few centimetres behind it.
 //!
 //! | symbol | our name | unit, frame |
 //! |---|---|---|
@@ -33,14 +33,14 @@ use sightline_geometry::frames::{Point3, Vector3};
 /// Marks a block without a vertex.
 const NOTHING: u32 = u32::MAX;
 
-/// How a mesh is made.
+/// Settings of the mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MeshSettings {
     /// Wanted distance between neighbouring vertices, m; the grid is thinned to it, never refined. 0: every point.
     pub spacing_m: f64,
-    /// Neighbours whose ranges have a greater ratio are not joined. Too small: slopes tear; too large: rocks stick to
-    /// the ground behind them.
+    /// Largest ratio of the ranges of joined neighbours. Too small: slopes tear; too large: rocks stick to the ground
+    /// behind them.
     pub depth_ratio_max: f64,
     /// Greatest angle between a facet's normal and the line of sight, deg.
     pub grazing_max_deg: f64,
@@ -53,56 +53,56 @@ impl Default for MeshSettings {
     }
 }
 
-/// The part of a surface that is wanted.
+/// The part of a surface to be meshed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Region {
-    /// Its middle, in the frame of the points, m.
+    /// Centre, in the frame of the points, m.
     pub centre: Point3,
-    /// How far it reaches, m.
+    /// Radius, m.
     pub radius_m: f64,
 }
 
-/// By how much a thinned mesh misses the points that it stands for, along their lines of sight.
+/// Error of a thinned mesh at the points of the grid, along their lines of sight.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Detail {
-    /// Points of a block's side that became one vertex.
+    /// Points per side of the block that became one vertex.
     pub stride: usize,
-    /// Points that were compared.
+    /// Number of points compared.
     pub points: usize,
-    /// Root mean square, m; the noise of the points is in it.
+    /// Root mean square error, m; includes the noise of the points.
     pub rms_m: f64,
-    /// Largest, m.
+    /// Largest error, m.
     pub worst_m: f64,
 }
 
-/// A triangulated surface seen from one place.
+/// A triangulated surface seen from one viewpoint.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
     /// v, m, in the frame of the grid.
     pub vertices: Vec<Point3>,
-    /// 1σ of each vertex along its line of sight, m: the median of its points', because the errors of neighbours are
-    /// alike; 0 where unknown.
+    /// 1σ of each vertex along its line of sight, m: the median of its points' σ, because the errors of neighbours are
+    /// correlated; 0 where unknown.
     pub range_sigma_m: Vec<f32>,
-    /// Numbers of the vertices of each facet, clockwise as seen from the viewpoint: (b − a) × (c − a) points away from it.
+    /// Vertex indices of each facet, clockwise as seen from the viewpoint: (b − a) × (c − a) points away from it.
     pub triangles: Vec<[u32; 3]>,
-    /// o: from where the surface was seen, m, in the same frame.
+    /// o: position of the instrument, m, in the same frame.
     pub viewpoint: Point3,
-    /// What thinning lost.
+    /// Error of thinning.
     pub detail: Detail,
 }
 
-/// The vertices of blocks of points, row by row.
+/// One vertex per block of points, row by row.
 struct Lattice {
     columns: usize,
     rows: usize,
     stride: usize,
-    /// Numbers of vertices.
+    /// Vertex indices; `NOTHING` where a block has no vertex.
     vertices: Vec<u32>,
     ranges_m: Vec<f64>,
 }
 
 impl Mesh {
-    /// The mesh of a grid whose points were seen from `viewpoint`; with a region only of what lies in it.
+    /// Meshes a grid whose points were measured from `viewpoint`; with a region, only the vertices inside it.
     pub fn from_grid(
         grid: &PointGrid,
         viewpoint: &Point3,
@@ -121,7 +121,7 @@ impl Mesh {
         mesh
     }
 
-    /// Thins the grid to one vertex a block.
+    /// Thins the grid to one vertex per block.
     fn add_vertices(&mut self, grid: &PointGrid, region: Option<&Region>, stride: usize) -> Lattice {
         let (columns, rows) = (grid.width / stride, grid.height / stride);
         let mut lattice = Lattice {
@@ -153,7 +153,7 @@ impl Mesh {
         lattice
     }
 
-    /// Adds the facets of the cell whose last corner is at a column and a row.
+    /// Adds the facets of the cell whose last corner is at (`column`, `row`).
     fn add_cell(&mut self, lattice: &Lattice, column: usize, row: usize, settings: &MeshSettings) {
         let at = |x: usize, y: usize| lattice.vertices[y * lattice.columns + x];
         let [a, b, c, d] =
@@ -174,7 +174,8 @@ impl Mesh {
         }
     }
 
-    /// A triangle, clockwise for the viewpoint; none where the depth jumps or the surface is seen edge-on.
+    /// Orients a triangle clockwise as seen from the viewpoint; `None` at a depth discontinuity or if the facet is seen
+    /// edge-on.
     fn facet(&self, mut triangle: [u32; 3], lattice: &Lattice, settings: &MeshSettings) -> Option<[u32; 3]> {
         let ranges_m = triangle.map(|vertex| lattice.ranges_m[vertex as usize]);
         let (nearest, farthest) =
@@ -196,7 +197,7 @@ impl Mesh {
     }
 }
 
-/// How many points a side of a block may have for vertices `spacing_m` apart, by the median distance of neighbours.
+/// Points per side of a block for vertices `spacing_m` apart, from the median distance of neighbours.
 fn stride_for(grid: &PointGrid, region: Option<&Region>, spacing_m: f64) -> usize {
     if spacing_m <= 0.0 {
         return 1;
@@ -205,7 +206,7 @@ fn stride_for(grid: &PointGrid, region: Option<&Region>, spacing_m: f64) -> usiz
         region
             .is_none_or(|region| (point - region.centre).norm_squared() <= region.radius_m * region.radius_m)
     };
-    // Every seventh point of every seventh row tells the median well enough.
+    // Every seventh point of every seventh row is a sufficient sample for the median.
     let mut gaps_m = Vec::new();
     for y in (0..grid.height).step_by(7) {
         for x in (1..grid.width).step_by(7) {
@@ -251,7 +252,7 @@ impl Block {
         }
     }
 
-    /// Point, range and 1σ of the block's vertex; none where less than half of its `places` have points.
+    /// Point, range and 1σ of the block's vertex; `None` if less than half of its `places` contain points.
     fn vertex(&mut self, places: usize, viewpoint: &Point3) -> Option<(Point3, f64, f32)> {
         let count = self.ranges_m.len();
         if count == 0 || 2 * count < places {
@@ -265,7 +266,7 @@ impl Block {
     }
 }
 
-/// By how much the mesh misses the points between four vertices that belong together.
+/// Measures the error of the interpolated mesh at the points of every cell without a depth discontinuity.
 fn detail(grid: &PointGrid, viewpoint: &Point3, lattice: &Lattice, ratio_max: f64) -> Detail {
     let stride = lattice.stride;
     let mut detail = Detail { stride, ..Detail::default() };

@@ -1,8 +1,8 @@
-//! Meshes of grids whose surface is a formula: cuts, level of detail, what thinning loses.
+//! Meshes of analytic surfaces: cuts, level of detail, error of thinning.
 
 use super::*;
 
-/// Points where the rays of a pinhole meet a depth that depends on the pixel.
+/// Points on the rays of a pinhole at a depth that depends on the pixel.
 fn grid(side: usize, depth_m: impl Fn(f64, f64) -> f64) -> PointGrid {
     let middle = (side as f64 - 1.0) / 2.0;
     let point = |i: usize| {
@@ -23,7 +23,7 @@ fn mesh(grid: &PointGrid, spacing_m: f64) -> Mesh {
     Mesh::from_grid(grid, &Point3::origin(), None, &settings)
 }
 
-/// Whether a mesh has facets from one side of the middle to the other.
+/// Returns whether a mesh has facets across x = 0.
 fn bridges(mesh: &Mesh) -> bool {
     mesh.triangles.iter().any(|triangle| {
         let sides = triangle.map(|vertex| mesh.vertices[vertex as usize].x > 0.0);
@@ -63,8 +63,8 @@ fn all_facets_go_round_clockwise_for_the_viewpoint() {
 #[test]
 fn a_hole_stays_a_hole_and_a_missing_corner_leaves_one_facet() {
     let holed = grid(10, |u, v| if u.abs() < 0.002 && v.abs() < 0.002 { f64::NAN } else { 2.0 });
-    // Four points are missing: nine cells lose them, of which the four at the corners keep one facet each, unless their
-    // diagonal runs to the missing point.
+    // Four points are missing: nine cells lose corners. The four at the corners of the hole keep one facet each unless
+    // their diagonal ends at the missing point.
     let triangles = mesh(&holed, 0.0).triangles.len();
     assert_eq!(holed.count(), 96);
     assert!((2 * 81 - 18..=2 * 81 - 14).contains(&triangles), "{triangles}");
@@ -72,8 +72,8 @@ fn a_hole_stays_a_hole_and_a_missing_corner_leaves_one_facet() {
 
 #[test]
 fn thinning_tells_what_it_loses_and_a_wrong_point_does_not_count() {
-    // A ball of radius R = 0.5 m and a spacing s: between four corners the mesh sinks by s²/(6 R) on average, the median of
-    // a block lies s²/(12 R) deep, and up to 28° of slant stretch both by half: 0.25 to 0.38 s²/R.
+    // A ball of radius R = 0.5 m, spacing s: between four corners the mesh is s²/(6 R) too deep on average, the median
+    // of a block s²/(12 R), and a slant of up to 28° increases both by up to half: 0.25 to 0.38 s²/R.
     let ball = |u: f64, v: f64| {
         let sight = Vector3::new(u, v, 1.0);
         let (a, b, c) = (sight.norm_squared(), 2.0 * sight.z, 4.0 - 0.25);

@@ -1,29 +1,31 @@
-//! The shape tracker's registration: where the target is, by the shape of its surroundings alone (Deans et al. 2005, D§2).
+//! Registration for the shape tracker: locates the target by the shape of its surroundings alone (Deans et al. 2005,
+//! D§2).
 //!
 //! ```text
 //! points ─► mesh ─┐ fixed: the target's first view                ┌─ path, residuals before and after
 //!                 ├─► range_sensor ─► coarse_register ─► refine_register ─► covariance ─► failure or not
-//! points ─► mesh ─┘ moving: the present view       └─ J over (Δx, Δy)
+//! points ─► mesh ─┘ moving: the current view       └─ J over (Δx, Δy)
 //! ```
-//! Every present view is registered to the *first* view of the target, so that errors do not add up (R189). What comes
-//! out takes points of the present frame into the first one; the target, known there, is carried back.
+//! Every current view is registered to the *first* view of the target, so that errors do not accumulate (R189). The
+//! result maps points of the current frame into the first one; its inverse maps the target's first position into the
+//! current frame.
 //!
-//! | file | what it does |
+//! | file | contents |
 //! |---|---|
-//! | `grid` | points in the order in which they were seen |
+//! | `grid` | points in the order of the instrument's rows and columns |
 //! | `mesh` | triangles between neighbours, cut at jumps; level of detail |
-//! | `range_sensor`, `rasterise` | a mesh as a picture of depths |
-//! | `objective` | D-Eq 12 with a least overlap |
+//! | `range_sensor`, `rasterise` | rendered depth map of a mesh |
+//! | `objective` | D-Eq 12 with a minimum overlap |
 //! | `coarse_register` | D-Eq 13, 14 over all shifts |
-//! | `refine_register`, `nelder_mead` | the six parameters; the paper's way and point to plane |
-//! | `held` | what is known of the motion before |
-//! | `pairs`, `slopes` | distances along normals with their noise |
-//! | `covariance` | how well all that is known |
-//! | `failure` | why it is not to be used |
+//! | `refine_register`, `nelder_mead` | all six parameters; the paper's method and point to plane |
+//! | `held` | prior of the motion |
+//! | `pairs`, `slopes` | point-to-plane residuals with their noise |
+//! | `covariance` | covariance of the result |
+//! | `failure` | reasons to reject the result |
 //!
-//! Frames: *fixed* and *moving* are the rover frames of the two views; *sensor* is that of the virtual sensor, at the
-//! target. A result is `fixed_from_moving`. All are pure functions; rayon is used in the coarse search only, and the
-//! bits do not depend on it.
+//! Frames: *fixed* and *moving* are the rover frames of the two views; *sensor* is the frame of the virtual sensor,
+//! centred at the target. A result is `fixed_from_moving`. All functions are pure; only the coarse search uses rayon,
+//! and its bits do not depend on the number of threads.
 //!
 //! Source: Deans et al. 2005, D§2 "3D shape based tracker"; R187–R204; E24, E27, E28, E31.
 
@@ -67,44 +69,44 @@ use objective::{Objective, motion};
 use pairs::{Moving, Template};
 use refine_register::{Refinement, refine_register};
 
-/// What is registered.
+/// Input of a registration.
 #[derive(Clone, Copy, Debug)]
 pub struct RegistrationInput<'a> {
     /// The first view of the target; its frame is `fixed`.
     pub fixed: &'a Mesh,
-    /// The present view; its frame is `moving`.
+    /// The current view; its frame is `moving`.
     pub moving: &'a Mesh,
-    /// Where the search begins (R197).
+    /// Initial estimate of the motion (R197).
     pub start_fixed_from_moving: &'a Pose,
     /// The target in the first view, m.
     pub target_in_fixed: &'a Point3,
-    /// Half the width of what is to be recognised, m.
+    /// Half the width of the object around the target, m.
     pub half_width_m: f64,
-    /// How well the start is known; none: not at all.
+    /// Uncertainty of the start; `None`: no prior.
     pub prior: Option<Prior>,
-    /// The virtual sensor; none: one that looks at the target ([`sensor_for`]).
+    /// The virtual sensor; `None`: one that points at the target ([`sensor_for`]).
     pub sensor: Option<RangeSensor>,
     /// Once requested, the registration ends soon and its result is discarded.
     pub cancel: Cancel<'a>,
 }
 
-/// How well the start of a registration is known, before the surfaces are compared.
+/// Prior uncertainty of the start of a registration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prior {
-    /// Covariance of the target in the present view, m², frame of that.
+    /// Covariance of the target in the current view, m², in the frame of that view.
     pub target_m2: Matrix3<f64>,
     /// 1σ of the attitude about each axis, rad.
     pub attitude_rad: f64,
 }
 
-/// Differences of depth, h − z, as the sensor sees them; m, row by row, not a number where not both are seen (R202).
+/// Differences of depth, h − z, in the sensor's image; m, row by row; NaN unless both surfaces cover the pixel (R202).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DepthErrors {
-    /// Columns.
+    /// Columns of the image.
     pub width: usize,
-    /// Rows.
+    /// Rows of the image.
     pub height: usize,
-    /// The depths of the fixed surface, m; infinite where it is not seen.
+    /// Depths of the fixed surface, m; infinite where it does not cover the pixel.
     pub fixed_m: Vec<f32>,
     /// At the start.
     pub before_m: Vec<f32>,
@@ -114,63 +116,65 @@ pub struct DepthErrors {
     pub fine_m: Vec<f32>,
 }
 
-/// A registration, whether it is to be used or not.
+/// A registration, accepted or rejected.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Registration {
-    /// Takes points of the present view into the first; the start where nothing was found.
+    /// Maps points of the current view into the first; the start if the registration ended early.
     pub fixed_from_moving: Pose,
-    /// The target in the present view, m.
+    /// The target in the current view, m.
     pub target_in_moving: Point3,
-    /// The covariance of that by the registration alone, m²: the target's own in the first view comes on top.
+    /// Covariance of `target_in_moving` from the registration alone, m²; excludes the target's own error in the first
+    /// view.
     pub covariance_in_moving: Option<Matrix3<f64>>,
-    /// How well the motion is known; in the axes of the sensor, about the target.
+    /// Covariance of the motion, in the axes of the sensor, about the target.
     pub precision: Option<Precision>,
-    /// J at the start, after the coarse search, after the refinement.
+    /// J at the start, after the coarse search and after the refinement.
     pub agreement: [Option<Agreement>; 3],
-    /// How many times the surfaces differ as much as their noise explains; none where no noise is known.
+    /// Reduced misfit: RMS residual over its predicted σ (1 = consistent with the noise model). `None` without a noise
+    /// model.
     pub misfit: Option<f64>,
-    /// How far the refinement turned from the start, rad.
+    /// Rotation angle of the refinement from the start, rad.
     pub turn_rad: f64,
     /// The coarse search.
     pub coarse: CoarseSurface,
-    /// The way of the refinement.
+    /// Steps of the refinement.
     pub path: Vec<PathStep>,
-    /// What the sensor sees.
+    /// Differences of depth in the sensor's image.
     pub depth_errors: DepthErrors,
-    /// The sensor.
+    /// The virtual sensor; `None` if the registration ended before it was chosen.
     pub sensor: Option<RangeSensor>,
-    /// Why the result is not to be used; none where it is.
+    /// Reason for rejecting the result; `None` if it is accepted.
     pub failure: Option<Failure>,
 }
 
-/// What a registration tells in a few numbers.
+/// Summary of a registration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RegistrationRecord {
-    /// Takes points of the present view into the first.
+    /// Maps points of the current view into the first.
     pub fixed_from_moving: PoseRecord,
-    /// The target in the present view, m.
+    /// The target in the current view, m.
     pub target_in_moving: [f64; 3],
-    /// 1σ of it in the weakest direction, m.
+    /// 1σ of the target in its least constrained direction, m.
     pub sigma_m: Option<f64>,
-    /// Covariance of the small motion about the target, axes of the sensor.
+    /// Covariance of the offset (t, ω) about the target, axes of the sensor.
     pub covariance: Option<Matrix6<f64>>,
-    /// J before, after the coarse search and at the end, m.
+    /// J at the start, after the coarse search and at the end, m.
     pub mean_m: [Option<f64>; 3],
-    /// Share of the target's pixels that both surfaces cover at the end.
+    /// Fraction of the fixed surface's pixels that both surfaces cover at the end.
     pub overlap: Option<f64>,
-    /// How many times the surfaces differ as much as their noise explains.
+    /// Reduced misfit: RMS residual over its predicted σ.
     pub misfit: Option<f64>,
-    /// Why it is not to be used.
+    /// Reason for rejecting the result; `None` if it is accepted.
     pub failure: Option<Failure>,
 }
 
 impl Registration {
-    /// 1σ of the target in the weakest direction, m.
+    /// 1σ of the target in its least constrained direction, m.
     pub fn sigma_m(&self) -> Option<f64> {
         self.covariance_in_moving.map(|covariance| covariance::weakest(&covariance).0)
     }
 
-    /// The few numbers.
+    /// Returns the summary.
     pub fn record(&self) -> RegistrationRecord {
         RegistrationRecord {
             fixed_from_moving: PoseRecord::from(&self.fixed_from_moving),
@@ -190,12 +194,12 @@ impl Registration {
     }
 }
 
-/// The sensor that looks at a target along the mean of both lines of sight and spans its surroundings.
+/// The sensor that points at the target along the mean of both lines of sight and spans its surroundings.
 pub fn sensor_for(input: &RegistrationInput<'_>, settings: &ShapeSettings) -> RangeSensor {
     let sight = |viewpoint: Point3| (input.target_in_fixed - viewpoint).normalize();
     let first = sight(input.fixed.viewpoint);
     let both = first + sight(input.start_fixed_from_moving * input.moving.viewpoint);
-    // Views from opposite sides have no mean; the first then decides.
+    // Opposite lines of sight have no mean; the first view's is used.
     let direction = if both.norm() > 0.2 { both } else { first };
     let side_m = 2.0 * input.half_width_m * (1.0 + settings.margin);
     RangeSensor::looking_at(input.target_in_fixed, &direction, side_m, settings.sensor_px)
@@ -213,7 +217,7 @@ pub fn register(input: &RegistrationInput<'_>, settings: &ShapeSettings) -> Regi
     }
     let sensor = input.sensor.unwrap_or_else(|| sensor_for(input, settings));
     result.sensor = Some(sensor);
-    // A sensor with a place of its own turns the surface about the target as well.
+    // The target is the pivot of rotations also if the caller gave the sensor.
     let pivot = sensor.sensor_from_fixed * input.target_in_fixed;
     let template = Template::new(sensor, input.fixed, pivot, settings);
     let moving = Moving::new(input.moving, &(sensor.sensor_from_fixed * input.start_fixed_from_moving));
@@ -244,7 +248,7 @@ pub fn register(input: &RegistrationInput<'_>, settings: &ShapeSettings) -> Regi
     finish(result, &template, ways, (input, &held), settings)
 }
 
-/// Refines the motion; where its start is known, once more with the number of pixels that were seen to err together.
+/// Refines the motion. With a prior, repeats the fit using the measured correlation of the residuals.
 fn refine(
     template: &Template,
     near: &Moving,
@@ -270,8 +274,8 @@ fn refine(
     (end, path)
 }
 
-/// What is known at the end of a registration, and whether it is to be used; by the offsets at the start, after the coarse
-/// search and at the end, each with the part of the moving surface that is seen there.
+/// Computes residuals, covariance and verdict at the end of a registration. `ways` are the offsets at the start, after
+/// the coarse search and at the end, each with the part of the moving surface to render.
 fn finish(
     mut result: Registration,
     template: &Template,
@@ -311,7 +315,8 @@ fn finish(
     result
 }
 
-/// How far around a target points are needed, m: the sensor's diagonal, and as far as the moving one may be off.
+/// Radius around the target within which points are needed, m: half the sensor's diagonal plus the larger of search
+/// range and start error.
 pub fn region_radius_m(half_width_m: f64, settings: &ShapeSettings, start_error_m: f64) -> f64 {
     let half_side_m = half_width_m * (1.0 + settings.margin);
     half_side_m * std::f64::consts::SQRT_2

@@ -1,20 +1,20 @@
-//! The simplex method of Nelder and Mead: a minimum without derivatives (R201).
+//! The Nelder–Mead simplex method: minimisation without derivatives (R201).
 //!
 //! ```text
 //! order f_1 ≤ … ≤ f_{n+1},  c = centroid of the best n,  d = c − x_{n+1}
-//! reflect   x_r = c + d                 f_1 ≤ f_r < f_n: take it
+//! reflect   x_r = c + d                 f_1 ≤ f_r < f_n: accept
 //! expand    x_e = c + χ d               f_r < f_1: the better of the two
-//! contract  outside  c + ψ d            f_n ≤ f_r < f_{n+1}: take it where it is not above f_r
-//!           inside   c − ψ d            else: take it where it is below f_{n+1}
+//! contract  outside  c + ψ d            f_n ≤ f_r < f_{n+1}: accept if not above f_r
+//!           inside   c − ψ d            else: accept if below f_{n+1}
 //! shrink    x_i = x_1 + σ (x_i − x_1)   otherwise
 //! classic   χ = 2, ψ = σ = ½            adaptive, n = 6:  χ = 1 + 2/n, ψ = ¾ − 1/(2n), σ = 1 − 1/n  (Gao & Han 2012)
 //! stop      max |f_i − f_1| < 1e-6 m and every edge below 0.1 mm, 0.01°, or 600 evaluations; then twice again with a
 //!           fresh simplex around the best
 //! ```
-//! Parameters are measured in edges of the first simplex, 2 cm and 1°, so that metres and radians are alike.
+//! Parameters are in units of the first simplex's edges, 2 cm and 1°, so that metres and radians are comparable.
 //!
-//! **Why ours**: `argmin`, the crate one would take, runs its solvers inside an executor that reads the clock, has neither
-//! this rule to stop nor the adaptive coefficients, and keeps no path; what is left of it are these lines.
+//! **Why ours**: the crate `argmin` runs its solvers inside an executor that reads the clock, has neither this stopping
+//! rule nor the adaptive coefficients, and does not record the path.
 //!
 //! | symbol | our name | unit |
 //! |---|---|---|
@@ -29,28 +29,28 @@ use utoipa::ToSchema;
 
 use super::objective::Offset;
 
-/// Parameters.
+/// Number of parameters.
 const N: usize = 6;
 
-/// How the simplex moves and when it stops.
+/// Coefficients and stopping rule of the simplex.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SimplexSettings {
     /// Edges of the first simplex along the three axes, m.
     pub edge_m: f64,
-    /// Its edges in the three turns, rad.
+    /// Edges of the first simplex along the three rotations, rad.
     pub edge_rad: f64,
-    /// How often it begins anew around the best point.
+    /// Number of restarts around the best point.
     pub restarts: u32,
-    /// Most evaluations of one run.
+    /// Largest number of evaluations of one run.
     pub evaluations_max: u32,
-    /// Stops below this spread of values, m …
+    /// Stops when the spread of values is below this, m …
     pub spread_m: f64,
-    /// … and below this size, m …
+    /// … and the size of the simplex is below this, m …
     pub size_m: f64,
     /// … and rad.
     pub size_rad: f64,
-    /// Whether the coefficients go with the number of parameters.
+    /// Whether the coefficients depend on the number of parameters (Gao & Han 2012).
     pub adaptive: bool,
 }
 
@@ -70,16 +70,16 @@ impl Default for SimplexSettings {
     }
 }
 
-/// The best point after a move of the simplex.
+/// The best point after an iteration of the simplex.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PathStep {
-    /// How often the objective was evaluated so far.
+    /// Number of evaluations of the objective so far.
     pub evaluations: u32,
-    /// The run: 0, then one more with each restart.
+    /// Index of the run: 0, then one more with each restart.
     pub run: u32,
-    /// Its value, m.
+    /// Objective at the best point, m.
     pub value_m: f64,
-    /// Where: shift (m) and turn vector (rad) from the start, axes of the sensor.
+    /// The best point: translation (m) and rotation vector (rad) from the start, axes of the sensor.
     pub offset: [f64; N],
 }
 
@@ -89,7 +89,7 @@ struct Vertex {
     value: f64,
 }
 
-/// The least value near `start`: where, how much, and the way there.
+/// Minimises from `start`; returns the point, its value and the path.
 pub fn minimise(
     mut objective: impl FnMut(&Offset) -> f64,
     start: &Offset,
@@ -173,7 +173,7 @@ fn descend(
     simplex[0]
 }
 
-/// Puts the corners in order of their values; whether these and the edges are alike.
+/// Sorts the corners by value; returns whether the spread of values and the edges are below the limits.
 fn is_small(simplex: &mut [Vertex; N + 1], settings: &SimplexSettings) -> bool {
     simplex.sort_by(|a, b| a.value.total_cmp(&b.value));
     let best = simplex[0];
@@ -187,7 +187,7 @@ fn is_small(simplex: &mut [Vertex; N + 1], settings: &SimplexSettings) -> bool {
 mod tests {
     use super::*;
 
-    /// A valley of absolute values that bends, in units of which none is like another.
+    /// A curved valley of absolute values, with a different scale in every direction.
     fn valley(p: &Offset) -> f64 {
         let d = p - Offset::new(0.013, -0.021, 0.034, 0.01, -0.02, 0.015);
         (d[0] - 3.0 * d[4]).abs()

@@ -1,18 +1,18 @@
-//! How well a moved mesh fits: the mean of absolute differences of depth (D-Eq 12, E31).
+//! Objective of the shape registration: the mean absolute difference of depth (D-Eq 12, E31).
 //!
 //! ```text
 //! J(p) = 1/n Σ_i | h_i(p) − z_i |      over the n pixels that both surfaces cover
-//!        infinite where n < overlap_min of the pixels that the fixed surface covers                                  E31, R196
-//! T_p  = translation by c + t, turn by the vector ω, translation by −c
+//!        infinite where n < overlap_min of the pixels that the fixed surface covers                           E31, R196
+//! T_p  = translation by c + t, rotation by the vector ω, translation by −c
 //! ```
-//! **How much of the sensor is covered.** The plain sum of D-Eq 12 falls when the surfaces are pulled apart; the mean does
-//! not, but it still may pick the pixels that fit. The least share of the fixed surface's pixels bounds that; the share
-//! is part of the result. A pixel that only one surface covers says nothing: holes of stereo are no evidence.
+//! **Overlap.** The plain sum of D-Eq 12 falls when the surfaces are pulled apart. The mean does not, but it may still
+//! select the pixels that fit; the least fraction of the fixed surface's pixels bounds that. The fraction is part of the
+//! result. A pixel that only one surface covers is ignored: holes of stereo are no evidence.
 //!
 //! | symbol | our name | unit, frame |
 //! |---|---|---|
 //! | p = (t, ω) | [`Offset`] | m, rad; axes of the sensor; ω a rotation vector instead of Euler angles (E30) |
-//! | c | `pivot` | m, sensor: the target, so that turns and shifts do not act alike |
+//! | c | `pivot` | m, sensor: the target, which decouples rotations from translations |
 //! | z, h | depths | m, sensor |
 //!
 //! Source: D-Eq 8, 11, 12; R190, R194–R196; E31.
@@ -24,12 +24,12 @@ use super::range_sensor::RangeSensor;
 use super::rasterise::{Depths, Facets, Picture, rasterise};
 use sightline_geometry::frames::{Point3, Pose, Vector3};
 
-/// Sums that run side by side.
+/// Number of partial sums.
 const LANES: usize = 32;
-/// Larger differences are those to nothing, m.
+/// Upper bound of a difference, m; beyond it, one surface does not cover the pixel.
 const NOTHING_M: f32 = 1e6;
 
-/// A small motion: shift t (m), then turn vector ω (rad), in the axes of the sensor about a pivot.
+/// A small motion: translation t (m), then rotation vector ω (rad), in the axes of the sensor about a pivot.
 pub type Offset = Vector6<f64>;
 
 /// The motion of an offset about a pivot.
@@ -39,26 +39,26 @@ pub fn motion(offset: &Offset, pivot: &Point3) -> Pose {
     Pose::from_parts(Translation3::from(pivot.coords + shift - turn * pivot.coords), turn)
 }
 
-/// The offset whose motion about a pivot this is.
+/// The offset of a motion about a pivot; inverse of [`motion`].
 pub fn offset(motion: &Pose, pivot: &Point3) -> Offset {
     let shift = motion * pivot - pivot;
     let turn = motion.rotation.scaled_axis();
     Offset::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
 }
 
-/// How well two range images agree.
+/// Value of the objective.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Agreement {
-    /// J, m; infinite where too little is covered by both.
+    /// J, m; infinite if the overlap is too small.
     pub mean_m: f64,
-    /// Share of the fixed surface's pixels that both cover.
+    /// Fraction of the fixed surface's pixels that both surfaces cover.
     pub overlap: f64,
 }
 
-/// The objective of one registration, with room for its work.
+/// The objective of one registration, with its buffers.
 pub(super) struct Objective<'a> {
     pub(super) sensor: &'a RangeSensor,
-    /// z of every pixel; infinite where the fixed surface is not seen.
+    /// z of every pixel; infinite where the fixed surface does not cover it.
     pub(super) fixed_m: &'a [f32],
     pub(super) facets: &'a Facets,
     pub(super) pivot: Point3,
@@ -90,7 +90,7 @@ impl<'a> Objective<'a> {
         }
     }
 
-    /// J at an offset.
+    /// Evaluates J at an offset.
     pub(super) fn at(&mut self, offset: &Offset) -> Agreement {
         self.moving_m.fill(f32::INFINITY);
         let motion = motion(offset, &self.pivot);
@@ -100,7 +100,7 @@ impl<'a> Objective<'a> {
         agreement(sum_m, count, self.fixed_pixels, self.overlap_min)
     }
 
-    /// h − z of every pixel where J was asked for last, m; not a number where not both are seen.
+    /// h − z of every pixel at the last evaluation, m; NaN unless both surfaces cover the pixel.
     pub(super) fn differences_m(&self) -> Vec<f32> {
         let difference = |(h, z): (&f32, &f32)| if h.is_finite() && z.is_finite() { h - z } else { f32::NAN };
         self.moving_m.iter().zip(self.fixed_m).map(difference).collect()
@@ -114,7 +114,7 @@ pub(super) fn agreement(sum_m: f64, count: usize, fixed_pixels: usize, overlap_m
     Agreement { mean_m, overlap }
 }
 
-/// The sum of absolute differences where both depths are finite, and their number.
+/// Sum of absolute differences where both depths are finite, and the number of these pixels.
 struct Differences<'a> {
     fixed_m: &'a [f32],
     moving_m: &'a [f32],
@@ -131,7 +131,7 @@ impl WithSimd for Differences<'_> {
         let (moving, moving_rest) = self.moving_m.as_chunks::<LANES>();
         for (z, h) in fixed.iter().zip(moving) {
             for lane in 0..LANES {
-                // The difference of two infinities is not a number, and so not less.
+                // The difference of two infinities is NaN, for which the comparison is false.
                 let difference = (h[lane] - z[lane]).abs();
                 let is_common = difference < NOTHING_M;
                 sums[lane] += if is_common { difference } else { 0.0 };

@@ -1,14 +1,14 @@
-//! Pixels that both surfaces cover, as distances along the normal with their noise.
+//! Point-to-plane residuals of the pixels that both surfaces cover, with their noise.
 //!
 //! ```text
 //! r_i = n_i · (m_i − f_i) = (n_i · a_i)(h_i − z_i)      both points on the ray of pixel i, m_i = f_i + (h_i − z_i) a_i
 //! σ_i² = Σ over both surfaces  σ_range² max( (n_i · u_i)², 0.2² ) + σ_model²
 //! ∂r_i/∂(t, ω) = ( n_i, (m_i − c) × n_i )
 //! ```
-//! An error of range moves a point along its own line of sight u, of which only the part along the normal counts; but a
-//! surface seen edge-on is not known without error, which is why that part does not fall below a fifth (ours). σ_model is what a surface misses that its points' noise does not tell:
-//! chords of facets, and the smoothing by the window of stereo. Where no
-//! noise is known σ_i is 1 m, and all that follows is measured from the residuals alone.
+//! An error of range moves a point along its line of sight u; only its component along the normal counts. A surface seen
+//! edge-on still has an error, so that component is bounded below by a fifth (ours). σ_model is the error of a surface
+//! beyond the noise of its points: chords of facets, and the smoothing by the stereo window. Without a noise model σ_i
+//! is 1 m, and the scale is measured from the residuals alone.
 //!
 //! | symbol | our name | unit, frame |
 //! |---|---|---|
@@ -32,10 +32,10 @@ use super::settings::ShapeSettings;
 use super::slopes::Slopes;
 use sightline_geometry::frames::{Point3, Pose, Vector3};
 
-/// The least part of an error of range that counts.
+/// Lower bound of |n · u|.
 const EDGE_ON: f64 = 0.2;
 
-/// The fixed surface as the sensor sees it: all that stays as it is during a registration.
+/// The fixed surface in the sensor's image: everything that is constant during a registration.
 pub(super) struct Template {
     pub(super) sensor: RangeSensor,
     pub(super) image: RangeImage,
@@ -101,7 +101,7 @@ impl Template {
         }
     }
 
-    /// What the sensor sees of the moving surface at an offset, and the pixels in which it can be compared.
+    /// Renders the moving surface at an offset; returns the depth map and the pixels that can be compared.
     pub(super) fn pairs(&self, moving: &Moving, offset: &Offset) -> (RangeImage, Vec<Pair>) {
         let motion = motion(offset, &self.pivot);
         let image = self.sensor.see_facets(&moving.facets, &motion);
@@ -143,7 +143,7 @@ impl Moving {
         }
     }
 
-    /// The part of it that comes within `reach_px` of the sensor's picture after a motion.
+    /// The part of the surface within `reach_px` of the sensor's image after a motion.
     pub(super) fn near(&self, sensor: &RangeSensor, motion: &Pose, reach_px: usize) -> Self {
         let (facets, old_numbers) = self.facets.near(sensor, motion, reach_px);
         let sigma_m = old_numbers.iter().map(|&vertex| self.sigma_m[vertex as usize]).collect();
@@ -151,7 +151,7 @@ impl Moving {
     }
 }
 
-/// The standard deviation of pairs in units of what their noise explains, by their median: wrong pairs do not count.
+/// Scale of the residuals over their predicted σ, from the median absolute value: insensitive to outliers.
 pub(super) fn robust_scale(pairs: &[Pair]) -> f64 {
     let mut sizes: Vec<f64> = pairs.iter().map(|pair| pair.distance().abs()).collect();
     if sizes.is_empty() {

@@ -1,21 +1,21 @@
-//! The virtual range sensor: a mesh as a picture of depths, in time proportional to facets and pixels (R191–R194).
+//! The virtual range sensor: renders the depth map of a mesh, in time proportional to facets and pixels (R191–R194).
 //!
 //! ```text
-//! s' = α_i v'_i + α_j v'_j + α_k v'_k     α_i + α_j + α_k = 1          D-Eq 9, per mesh its own facets (E27)
+//! s' = α_i v'_i + α_j v'_j + α_k v'_k     α_i + α_j + α_k = 1          D-Eq 9, facets per mesh (E27)
 //! z  = n̂_c · s'                           s' in the sensor's frame     D-Eq 10 (E28)
 //! h(p) = n̂_c · T_p (α_i v_i + α_j v_j + α_k v_k)                       D-Eq 11
 //! orthographic:  u = x/δ + (W − 1)/2       w = z
 //! pinhole:       u = f x/z + (W − 1)/2     w = 1/z
 //! ```
-//! With either, w is an affine function of (u, v) on a facet, so that one rasteriser (`rasterise.rs`) serves both; the
-//! nearest facet counts, and only fronts are seen.
+//! In both cases w is an affine function of (u, v) on a facet, so that one rasteriser (`rasterise.rs`) serves both. The
+//! nearest facet is visible; back faces are culled.
 //!
-//! **Orthographic** is the default (ours; the paper says camera): its pixels are of one size on the surface, and a shift
-//! of the mesh by whole pixels is a shift of the picture, which makes the coarse search exact and cheap. A pinhole with
-//! the viewpoint of a scanner sees what that scanner saw.
+//! **Orthographic** is the default (ours; the paper says camera): its pixels have one size on the surface, and a shift
+//! of the mesh by whole pixels is a shift of the depth map, which makes the coarse search exact and cheap. A pinhole at
+//! the viewpoint of a scanner reproduces the scanner's view.
 //!
-//! **Where it stands.** It looks at the target along the mean of the two lines of sight, because what either side saw
-//! well it then sees well; its columns are as level as they can be; it spans the rock and a margin of ground.
+//! **Pose.** It points at the target along the mean of the two lines of sight, where both views are good; its rows are
+//! level; it spans the rock and a margin of ground.
 //!
 //! | symbol | our name | unit, frame |
 //! |---|---|---|
@@ -31,16 +31,16 @@ use serde::{Deserialize, Serialize};
 
 use sightline_geometry::frames::{Point3, Pose, Vector3};
 
-/// No facet is seen in this pixel.
+/// Index of a pixel without a facet.
 pub const NO_FACET: u32 = u32::MAX;
-/// Nearest depth that a pinhole sees, m.
+/// Near plane of a pinhole, m.
 pub(super) const NEAR_M: f32 = 0.05;
 
 /// How the sensor maps space to pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Projection {
-    /// All rays are parallel; the origin of the frame is in the middle of the picture.
+    /// All rays are parallel; the origin of the frame is at the centre of the image.
     Orthographic {
         /// δ: side of a pixel, m.
         pitch_m: f64,
@@ -55,9 +55,9 @@ pub enum Projection {
 /// A virtual range sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RangeSensor {
-    /// Takes points of the fixed surface's frame into the sensor's: x right, y down, z away.
+    /// Maps points of the fixed surface's frame into the sensor's: x right, y down, z away.
     pub sensor_from_fixed: Pose,
-    /// From there to pixels.
+    /// Projection from the sensor's frame to pixels.
     pub projection: Projection,
     /// Columns.
     pub width: usize,
@@ -65,23 +65,23 @@ pub struct RangeSensor {
     pub height: usize,
 }
 
-/// What a sensor sees of a mesh, pixel by pixel, row by row.
+/// Rendered depth map of a mesh, row by row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RangeImage {
     /// Columns.
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// Depth, m; infinite where nothing is seen.
+    /// Depth, m; infinite where there is no facet.
     pub depth_m: Vec<f32>,
-    /// The facet that is seen, by its number in the mesh; else [`NO_FACET`].
+    /// Index of the visible facet in the mesh, or [`NO_FACET`].
     pub facet: Vec<u32>,
-    /// α of the facet's three vertices.
+    /// α of the visible facet's three vertices.
     pub weights: Vec<[f32; 3]>,
 }
 
 impl RangeSensor {
-    /// An orthographic sensor of `side_px` × `side_px` that looks at `target` along `direction` and spans `side_m`.
+    /// An orthographic sensor of `side_px` × `side_px` that points at `target` along `direction` and spans `side_m`.
     pub fn looking_at(target: &Point3, direction: &Vector3, side_m: f64, side_px: usize) -> Self {
         let pitch_m = side_m / side_px as f64;
         Self {
@@ -92,7 +92,7 @@ impl RangeSensor {
         }
     }
 
-    /// A pinhole at `viewpoint` that looks along `direction`, `half_angle_rad` to each side.
+    /// A pinhole at `viewpoint` that points along `direction`; `half_angle_rad` is half its horizontal field of view.
     pub fn pinhole(
         viewpoint: &Point3,
         direction: &Vector3,
@@ -108,7 +108,7 @@ impl RangeSensor {
         }
     }
 
-    /// The same sensor with so many more pixels on every side.
+    /// The same sensor with `border_px` more pixels on every side.
     pub fn widened(&self, border_px: usize) -> Self {
         Self { width: self.width + 2 * border_px, height: self.height + 2 * border_px, ..*self }
     }
@@ -121,14 +121,14 @@ impl RangeSensor {
         }
     }
 
-    /// The point that a pixel sees at a depth, sensor frame, m.
+    /// The point at a depth on the ray of a pixel, sensor frame, m.
     pub fn point(&self, x: usize, y: usize, depth_m: f64) -> Point3 {
         let centred = |place: usize, count: usize| place as f64 - (count as f64 - 1.0) / 2.0;
         let pixel_m = self.pixel_m(depth_m);
         Point3::new(centred(x, self.width) * pixel_m, centred(y, self.height) * pixel_m, depth_m)
     }
 
-    /// How a point of a pixel's ray moves with its depth: (x, y, 1).
+    /// Derivative of a point on a pixel's ray by its depth: (x, y, 1).
     pub(super) fn along(&self, x: usize, y: usize) -> Vector3 {
         match self.projection {
             Projection::Orthographic { .. } => Vector3::z(),
@@ -136,7 +136,7 @@ impl RangeSensor {
         }
     }
 
-    /// Columns and rows of a point of the sensor's frame, px; none behind a pinhole.
+    /// Column and row of a point of the sensor's frame, px; `None` nearer than a pinhole's near plane.
     pub fn pixel(&self, point: &Point3) -> Option<[f64; 2]> {
         let scale = match self.projection {
             Projection::Orthographic { pitch_m } => 1.0 / pitch_m,
@@ -149,13 +149,13 @@ impl RangeSensor {
 }
 
 impl RangeImage {
-    /// Share of the pixels that see something.
+    /// Fraction of the pixels with a depth.
     pub fn covered(&self) -> f64 {
         let seen = self.depth_m.iter().filter(|depth| depth.is_finite()).count();
         seen as f64 / self.depth_m.len().max(1) as f64
     }
 
-    /// The mean over a pixel's facet of a value that its vertices have, by the weights of the pixel; 0 without a facet.
+    /// Interpolates values of the vertices on a pixel's facet; 0 without a facet.
     pub(super) fn interpolate(&self, pixel: usize, triangles: &[[u32; 3]], values: &[f32]) -> f32 {
         let Some(triangle) = triangles.get(self.facet[pixel] as usize) else { return 0.0 };
         let value = |k: usize| values.get(triangle[k] as usize).copied().unwrap_or(0.0);
@@ -164,7 +164,7 @@ impl RangeImage {
     }
 }
 
-/// The attitude of a sensor that looks along `direction` with level columns: +z of the reference frame is down.
+/// Orientation of a sensor that points along `direction` with level rows: +z of the reference frame is down.
 fn axes(direction: &Vector3) -> UnitQuaternion<f64> {
     let away = direction.normalize();
     let right = Vector3::z().cross(&away);

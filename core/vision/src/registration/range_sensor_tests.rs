@@ -1,4 +1,4 @@
-//! Range images against rays and planes; edges that two triangles share.
+//! Range images compared with rays and planes; edges shared by two triangles.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -7,7 +7,7 @@ use super::super::mesh::Mesh;
 use super::super::rasterise::{Canvas, Facets, Picture, rasterise};
 use super::*;
 
-/// How often each pixel was put.
+/// How often each pixel was written.
 struct Counts {
     counts: Vec<u32>,
 }
@@ -22,7 +22,7 @@ fn sensor(side_px: usize) -> RangeSensor {
     RangeSensor::looking_at(&Point3::origin(), &Vector3::x(), 1.0, side_px)
 }
 
-/// A square of cells, each split one way or the other, seen by a sensor that looks along x: vertices in its frame.
+/// A square of cells, each split along a random diagonal; vertices in the sensor's frame.
 fn patchwork(cells: usize, side_m: f64, mut vertex: impl FnMut(f64, f64) -> Point3, seed: u64) -> Mesh {
     let mut random = Pcg64::seed_from_u64(seed);
     let mut mesh = Mesh::default();
@@ -39,7 +39,7 @@ fn patchwork(cells: usize, side_m: f64, mut vertex: impl FnMut(f64, f64) -> Poin
     mesh
 }
 
-/// In the sensor's own frame.
+/// Renders a mesh given in the sensor's frame.
 fn seen(sensor: &RangeSensor, mesh: &Mesh) -> RangeImage {
     sensor.see(mesh, &Pose::identity())
 }
@@ -47,7 +47,7 @@ fn seen(sensor: &RangeSensor, mesh: &Mesh) -> RangeImage {
 #[test]
 fn every_pixel_of_a_patchwork_is_drawn_exactly_once() {
     let sensor = sensor(64);
-    // Vertices at random, and vertices exactly on pixel centres, where edges and corners meet them.
+    // Random vertices, and vertices exactly on pixel centres, where edges and corners meet them.
     for (seed, jitter, side_m) in [(1, 0.4, 0.9), (2, 0.0, 0.75), (3, 0.4, 3.0)] {
         let mut random = Pcg64::seed_from_u64(seed);
         let cells = 24;
@@ -86,7 +86,7 @@ fn depth_and_weights_are_those_of_the_ray_s_meeting_with_the_facet() {
             pixels += 1;
             let there =
                 sensor.point(pixel % sensor.width, pixel / sensor.width, f64::from(image.depth_m[pixel]));
-            // On the plane to what 1/256 pixel of a slope of 0.8 makes.
+            // On the plane to within the effect of 1/256 px at a slope of 0.8.
             assert!((plane(there.x, there.y).z - there.z).abs() < 1e-4);
             let weights = image.weights[pixel].map(f64::from);
             let triangle = mesh.triangles[image.facet[pixel] as usize];
@@ -124,7 +124,7 @@ fn a_sensor_looks_at_its_target_with_level_columns() {
     let at = sensor.sensor_from_fixed * target;
     assert!(at.coords.norm() < 1e-12);
     assert_eq!(sensor.pixel(&at), Some([31.5, 31.5]));
-    // What is below in the rover frame is below in the picture, and right is right.
+    // Down in the rover frame is down in the image, and right is right.
     let below = sensor.pixel(&(sensor.sensor_from_fixed * (target + Vector3::z() * 0.1))).unwrap();
     assert!((below[0] - 31.5).abs() < 1e-9 && below[1] > 35.0);
     let right = sensor.pixel(&(sensor.sensor_from_fixed * (target + Vector3::y() * 0.1))).unwrap();

@@ -1,24 +1,24 @@
-//! Triangles to pixels: the inner loops of the virtual range sensor (R191).
+//! Triangle rasterisation: the inner loops of the virtual range sensor (R191).
 //!
 //! ```text
-//! E_ab(p) = (b_x − a_x)(p_y − a_y) − (b_y − a_y)(p_x − a_x)        twice the area of (a, b, p), whole numbers
+//! E_ab(p) = (b_x − a_x)(p_y − a_y) − (b_y − a_y)(p_x − a_x)        twice the area of (a, b, p), integer
 //! inside:   E > 0, or E = 0 on an edge that points up, or level and to the right
 //! w(p)    = (E_bc w_a + E_ca w_b + E_ab w_c) / (E_bc + E_ca + E_ab)
 //! ```
-//! Vertices are first put on a lattice of 1/256 pixel, so that E is exact. The rule for E = 0 is that of a pixel centre
-//! moved to the right by nothing and down by nothing of nothing: it lies inside exactly one of the triangles around an
-//! edge or a vertex, so that neither gaps nor doubles occur at shared edges ("top-left rule").
+//! Vertices are first rounded to a lattice of 1/256 pixel, so that E is exact. The rule for E = 0 ("top-left rule") is
+//! that of a pixel centre moved by an infinitesimal amount to the right and a much smaller one down: it is inside
+//! exactly one of the triangles around an edge or a vertex, so that shared edges have neither gaps nor doubles.
 //!
-//! Moving and projecting the vertices are plain loops over lanes. Most triangles are about as large as a pixel, where
-//! the box around them holds one pixel or none; those without are dropped before any product is made.
+//! Transform and projection of the vertices are plain loops over lanes. Most triangles are about the size of a pixel;
+//! those whose bounding box contains no pixel centre are dropped before any product is computed.
 //!
 //! | name | meaning | unit, frame |
 //! |---|---|---|
 //! | `Facets::x`, `y`, `z` | vertices | m, sensor frame before the motion |
 //! | `Picture::u`, `v` | projected vertices | 1/256 px |
-//! | `Picture::w` | depth, or one over it | m or 1/m |
+//! | `Picture::w` | depth, or its reciprocal | m or 1/m |
 //!
-//! Source: D§2, "virtual range sensor"; R191; the lattice and the rule are those of graphics processors.
+//! Source: D§2, "virtual range sensor"; R191; lattice and rule as in graphics processors.
 
 use pulp::{Arch, Simd, WithSimd};
 
@@ -26,20 +26,20 @@ use super::mesh::Mesh;
 use super::range_sensor::{NEAR_M, Projection, RangeImage, RangeSensor};
 use sightline_geometry::frames::Pose;
 
-/// Lattice places in a pixel.
+/// Lattice points per pixel.
 const PLACES: f32 = 256.0;
-/// The same as a power of two.
+/// Base-2 logarithm of `PLACES`.
 const PLACES_LOG: u32 = 8;
-/// Vertices farther out are drawn in to here; their triangles do not meet the picture or are huge, 1/256 px.
+/// Coordinates are clamped to ±this, 1/256 px; triangles of such vertices are outside the image or huge.
 const FARTHEST: f32 = (1 << 27) as f32;
 
-/// A mesh in columns, in the sensor's frame, ready to be moved.
+/// A mesh as columns of coordinates, in the sensor's frame.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Facets {
     x: Vec<f32>,
     y: Vec<f32>,
     z: Vec<f32>,
-    /// Numbers of the vertices.
+    /// Vertex indices.
     pub(super) triangles: Vec<[u32; 3]>,
 }
 
@@ -55,8 +55,8 @@ impl Facets {
         facets
     }
 
-    /// Those triangles, with their vertices alone, that come within `reach_px` of the sensor's picture after a motion; and
-    /// what the numbers of these vertices were.
+    /// Returns the triangles within `reach_px` of the sensor's image after a motion, with their vertices only, and the
+    /// original indices of these vertices.
     pub(super) fn near(&self, sensor: &RangeSensor, motion: &Pose, reach_px: usize) -> (Self, Vec<u32>) {
         let mut picture = Picture::default();
         let wide = sensor.widened(reach_px);
@@ -90,7 +90,7 @@ impl Facets {
     }
 }
 
-/// Projected vertices; kept between calls so that nothing is allocated.
+/// Projected vertices; a buffer that is reused between calls.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Picture {
     u: Vec<i32>,
@@ -98,9 +98,9 @@ pub(super) struct Picture {
     w: Vec<f32>,
 }
 
-/// What is done with a pixel inside a triangle.
+/// Receiver of the pixels inside triangles.
 pub(super) trait Canvas {
-    /// `parts` are E_bc, E_ca, E_ab over their sum; `depth_m` is the depth there.
+    /// `parts` are E_bc, E_ca, E_ab over their sum; `depth_m` is the depth of the facet at the pixel.
     fn put(&mut self, pixel: usize, depth_m: f32, facet: u32, parts: [f32; 3]);
 }
 
@@ -115,7 +115,7 @@ impl Canvas for RangeImage {
     }
 }
 
-/// Depths alone, m; infinite where nothing is seen.
+/// Depths alone, m; infinite where there is no facet.
 pub(super) struct Depths<'a>(pub(super) &'a mut [f32]);
 
 impl Canvas for Depths<'_> {
@@ -125,7 +125,7 @@ impl Canvas for Depths<'_> {
     }
 }
 
-/// Draws facets, moved by `motion` in the sensor's frame, on a canvas as large as the sensor.
+/// Renders facets, moved by `motion` in the sensor's frame, to a canvas of the sensor's size.
 pub(super) fn rasterise(
     sensor: &RangeSensor,
     facets: &Facets,
@@ -169,7 +169,7 @@ impl Picture {
                 continue;
             }
             let w = [self.w[a], self.w[b], self.w[c]];
-            // Behind a pinhole w is not a number.
+            // Nearer than the near plane of a pinhole, w is NaN.
             if PINHOLE && (w[0] + w[1] + w[2]).is_nan() {
                 continue;
             }
@@ -197,7 +197,7 @@ impl Picture {
     }
 }
 
-/// Depth and weights of a pixel; seen through a pinhole the weights go with w, which is one over the depth.
+/// Depth and weights of a pixel. With a pinhole the weights are multiplied by w, the reciprocal of the depth.
 #[inline(always)]
 fn put<const PINHOLE: bool>(
     canvas: &mut impl Canvas,
@@ -215,7 +215,7 @@ fn put<const PINHOLE: bool>(
     }
 }
 
-/// The first and the last pixel whose centre lies between three lattice places, cut to the picture.
+/// The first and the last pixel centre within the range of three lattice coordinates, clipped to the image.
 #[inline(always)]
 fn span(places: [i32; 3], last: i32) -> (i32, i32) {
     let low = places[0].min(places[1]).min(places[2]);
@@ -223,15 +223,15 @@ fn span(places: [i32; 3], last: i32) -> (i32, i32) {
     (((low + (1 << PLACES_LOG) - 1) >> PLACES_LOG).max(0), (high >> PLACES_LOG).min(last))
 }
 
-/// E of one edge, as it grows from pixel to pixel.
+/// E of one edge, with its increments from pixel to pixel.
 #[derive(Clone, Copy)]
 struct Edge {
     from: [i64; 2],
     along: [i64; 2],
-    /// By one pixel to the right and down.
+    /// Increments per pixel to the right and down.
     right: i64,
     down: i64,
-    /// Added before the sign is asked: 0 where the edge itself belongs to the triangle.
+    /// Added before the test of the sign: 0 if the edge belongs to the triangle, else −1.
     bias: i64,
 }
 
@@ -256,7 +256,7 @@ impl Edge {
     }
 }
 
-/// Moves and projects all vertices.
+/// Transforms and projects all vertices.
 struct Project<'a> {
     facets: &'a Facets,
     /// Rotation and translation, row by row.

@@ -1,20 +1,20 @@
-//! The refinement over all six parameters: the paper's (R201), and a modern one to compare.
+//! Refinement of all six parameters: the paper's method (R201), and a modern one for comparison.
 //!
-//! | method | what is minimised | how |
+//! | method | objective | solver |
 //! |---|---|---|
 //! | [`Method::SimplexL1`] | mean absolute difference of depth, D-Eq 12 | Nelder–Mead with two restarts |
 //! | [`Method::PointToPlane`] | Σ ρ(r_i / s σ_i), distances along the normal | Gauss–Newton, reweighted |
 //!
-//! **Point to plane.** The partner of a pixel is what the sensor sees of the moving mesh on the same ray ("projective
-//! association"): no search among neighbours, and holes and occlusion are those of the sensor. The scale s is measured
-//! anew at every step (median), so that it falls as the surfaces close in: first everything counts, then what disagrees
-//! counts less and less. Steps are bounded, and damped where the shape does not hold them.
+//! **Point to plane.** The partner of a pixel is the point of the moving mesh on the same ray ("projective
+//! association"): no search among neighbours; holes and occlusion are those of the sensor. The scale s is measured at
+//! every step (median), so that it falls as the surfaces converge: first all pixels count, then outliers lose weight.
+//! Steps are bounded, and damped in unconstrained directions.
 //!
 //! ```text
 //! (H + Λ' + λ diag) δ = −Σ w r ∂r/∂p − Λ' p     H = Σ w ∂r/∂p ∂r/∂pᵀ,   Λ' of `held`,   w = ρ'(r/(s σ)) / σ²,   λ = 1e-4
 //! T ← T_δ T                              until |δt| < 10 µm and |δω| < 10 µrad, or 40 steps
 //! ```
-//! **What is drawn.** Facets farther from the picture than 15 cm at the start of the refinement are left out.
+//! **Culling.** Facets farther than 15 cm from the image at the start of the refinement are left out.
 //!
 //! | symbol | our name | unit, frame |
 //! |---|---|---|
@@ -34,31 +34,31 @@ use super::settings::{Method, ShapeSettings};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::estimate::weighted_motion::Loss;
 
-/// How far beside the picture facets may begin that are still drawn, m.
+/// Facets within this distance of the image are kept, m.
 const REACH_M: f64 = 0.15;
-/// The longest step, m.
+/// Longest translation of a step, m.
 const STEP_MAX_M: f64 = 0.05;
-/// The widest turn of a step, rad.
+/// Largest rotation of a step, rad.
 const TURN_MAX_RAD: f64 = 0.1;
 /// λ.
 const DAMPING: f64 = 1e-4;
-/// The scale does not fall below this share of the noise that the surfaces claim.
+/// Lower bound of the scale: this fraction of the predicted noise.
 const SCALE_MIN: f64 = 0.1;
 
-/// How a motion is refined.
+/// Settings and cancellation of a refinement.
 pub(super) struct Refinement<'a> {
     pub(super) settings: &'a ShapeSettings,
     /// Once requested, the refinement ends soon and its result is discarded.
     pub(super) cancel: Cancel<'a>,
 }
 
-/// The part of the moving surface that the refinement from a start can see.
+/// The part of the moving surface that can enter the sensor's image during a refinement from `start`.
 pub(super) fn near(template: &Template, moving: &Moving, start: &Offset) -> Moving {
     let reach_px = (REACH_M / template.sensor.pixel_m(template.pivot.z)).ceil() as usize;
     moving.near(&template.sensor, &motion(start, &template.pivot), reach_px)
 }
 
-/// Refines the motion from a start by one method: where it ends, and the way.
+/// Refines the motion from `start` by the selected method; returns its end and its steps.
 pub(super) fn refine_register(
     template: &Template,
     moving: &Moving,
@@ -81,7 +81,7 @@ pub(super) fn refine_register(
     }
 }
 
-/// Reweighted Gauss–Newton steps.
+/// Iteratively reweighted Gauss–Newton.
 fn point_to_plane(
     template: &Template,
     moving: &Moving,
@@ -113,13 +113,13 @@ fn point_to_plane(
     (at, path)
 }
 
-/// J over pairs, m.
+/// J over pairs, m; infinite without pairs.
 fn mean_depth_m(pairs: &[Pair]) -> f64 {
     let sum: f64 = pairs.iter().map(|pair| (pair.residual_m / pair.slant).abs()).sum();
     if pairs.is_empty() { f64::INFINITY } else { sum / pairs.len() as f64 }
 }
 
-/// δ; none where the pairs determine none.
+/// δ; `None` if the normal matrix is not positive definite.
 fn gauss_newton_step(pairs: &[Pair], loss: Loss, at: &Offset, held: &Held) -> Option<Offset> {
     let scale =
         robust_scale(pairs).max(if pairs.iter().all(|pair| pair.sigma_m == 1.0) { 1e-9 } else { SCALE_MIN });

@@ -1,4 +1,4 @@
-//! Rendering of a mesh by the virtual range sensor (R191): vertices to pixels, `rasterise`, to an image with facets.
+//! Renders a mesh with the virtual range sensor (R191).
 
 use super::mesh::Mesh;
 use super::range_sensor::{NO_FACET, RangeImage, RangeSensor};
@@ -6,12 +6,12 @@ use super::rasterise::{Facets, Picture, rasterise};
 use sightline_geometry::frames::Pose;
 
 impl RangeSensor {
-    /// Renders a mesh whose frame is placed by `sensor_from_mesh`.
+    /// Renders a mesh in the pose `sensor_from_mesh`.
     pub fn see(&self, mesh: &Mesh, sensor_from_mesh: &Pose) -> RangeImage {
         self.see_facets(&Facets::new(mesh, sensor_from_mesh), &Pose::identity())
     }
 
-    /// Renders facets that are moved first.
+    /// Renders facets after a motion.
     pub(super) fn see_facets(&self, facets: &Facets, motion: &Pose) -> RangeImage {
         let pixels = self.width * self.height;
         let mut image = RangeImage {

@@ -7,26 +7,26 @@ use super::mesh::MeshSettings;
 use super::nelder_mead::SimplexSettings;
 use sightline_geometry::estimate::weighted_motion::Loss;
 
-/// How the motion is refined.
+/// Method of refining the motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// As in the paper.
+    /// Nelder–Mead on the mean absolute difference of depth, as in the paper.
     #[default]
     SimplexL1,
     /// Robust least squares along the normals.
     PointToPlane,
 }
 
-/// The modern method's parameters.
+/// Settings of the point-to-plane refinement.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PlaneSettings {
-    /// Most steps.
+    /// Largest number of steps.
     pub steps_max: u32,
-    /// Ends below this shift, m, and this turn, rad.
+    /// Stops once every component of a step is below this; m for the translation, rad for the rotation.
     pub small: f64,
-    /// How the weight of a pixel falls off with its residual.
+    /// Robust loss: weight of a pixel as a function of its residual.
     pub loss: Loss,
 }
 
@@ -36,40 +36,42 @@ impl Default for PlaneSettings {
     }
 }
 
-/// How surfaces are registered.
+/// Settings of the shape registration.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ShapeSettings {
-    /// How meshes are made.
+    /// Settings of the meshes.
     pub mesh: MeshSettings,
-    /// Pixels of a side of the virtual sensor.
+    /// Side of the virtual sensor's image, px.
     pub sensor_px: usize,
-    /// What the sensor spans beyond the rock, as a share of its half width: ground holds the rock's height and tilt.
+    /// Margin of ground around the rock in the sensor's image, as a fraction of the rock's half width; it constrains
+    /// height and tilt.
     pub margin: f64,
-    /// How far the coarse search goes to each side, m; none: half the rock's width.
+    /// Half range of the coarse search in x and in y, m; `None`: half the rock's width.
     pub search_half_range_m: Option<f64>,
-    /// Least share of the fixed surface's pixels that both surfaces must cover.
+    /// Least fraction of the fixed surface's pixels that both surfaces must cover.
     pub overlap_min: f64,
-    /// Half the side of the windows whose planes give the normals, px.
+    /// Half the side of the windows in which planes are fitted for the normals, px.
     pub normal_radius_px: usize,
-    /// What a surface misses that the noise of its points does not tell, 1σ along the normal, m: facets, and the window of
-    /// stereo. Counts where noise is known.
+    /// Error of a surface beyond the noise of its points (facets, smoothing by the stereo window), 1σ along the normal,
+    /// m. Used only where the noise of the points is known.
     pub model_sigma_m: f64,
-    /// Error of the target that all pixels share, 1σ on each axis, m: stereo's window makes what is convex smaller.
+    /// Error of the target common to all pixels, 1σ on each axis, m: smoothing by the stereo window shrinks convex
+    /// shapes.
     pub common_sigma_m: f64,
-    /// How the motion is refined.
+    /// Method of refining the motion.
     pub method: Method,
-    /// The paper's method.
+    /// Settings of the paper's refinement.
     pub simplex: SimplexSettings,
-    /// The modern one.
+    /// Settings of the point-to-plane refinement.
     pub plane: PlaneSettings,
-    /// When the result is not to be used.
+    /// Limits beyond which the result is rejected.
     pub checks: CheckSettings,
 }
 
 impl Default for ShapeSettings {
-    /// 40 % overlap (R196), search by half the rock's width (R200), Nelder–Mead (R201); the rest is ours. The shared error is
-    /// fitted on rocks whose points a window of 2 to 3 cm smooths (docs/shape.md).
+    /// 40 % overlap (R196), search by half the rock's width (R200), Nelder–Mead (R201); the rest is ours. The common
+    /// error is fitted on rocks whose points are smoothed over 2 to 3 cm (docs/shape.md).
     fn default() -> Self {
         Self {
             mesh: MeshSettings::default(),
@@ -88,21 +90,21 @@ impl Default for ShapeSettings {
     }
 }
 
-/// When a registration is not to be used; all ours.
+/// Limits beyond which a registration is rejected; all ours.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CheckSettings {
-    /// Triangles that a surface needs at least.
+    /// Least number of triangles of a surface.
     pub triangles_min: usize,
-    /// Largest 1σ of the target in its weakest direction, m.
+    /// Largest 1σ of the target in its least constrained direction, m.
     pub sigma_max_m: f64,
-    /// How many times the surfaces may differ as much as their noise explains.
+    /// Largest reduced misfit: RMS residual over its predicted σ.
     pub misfit_max: f64,
-    /// How far the refinement may turn from the start, rad.
+    /// Largest rotation of the refinement from the start, rad.
     pub turn_max_rad: f64,
-    /// How far two minima of the coarse surface must be apart to be two, as a share of the half width.
+    /// Least distance between separate minima of the coarse search, as a fraction of the half width.
     pub apart: f64,
-    /// By what factor the other minimum must be higher than the best.
+    /// Least ratio of the second minimum of J to the best one.
     pub other_min: f64,
 }
 

@@ -1,8 +1,8 @@
-//! Slopes of a range image: planes through the neighbours of every pixel.
+//! Normals of a range image: planes fitted to the neighbours of every pixel.
 //!
 //! ```text
-//! z = a (x − x_i) + b (y − y_i) + c    least squares over the (2 k + 1)² pixels around i that are seen and whose depth
-//!                                      differs by no more than a slope of 3 explains
+//! z = a (x − x_i) + b (y − y_i) + c    least squares over the pixels of the (2 k + 1)² window around i that have a depth
+//!                                      within a slope of 3 of pixel i's
 //! n = (−a, −b, 1) / √(a² + b² + 1)     away from the sensor
 //! ```
 //! | symbol | our name | unit, frame |
@@ -16,22 +16,22 @@
 use super::range_sensor::{RangeImage, RangeSensor};
 use sightline_geometry::frames::Vector3;
 
-/// The steepest slope over which neighbours still belong together.
+/// Steepest slope between a pixel and the neighbours of its plane.
 const STEEPEST: f64 = 3.0;
-/// Neighbours, itself included, that a plane needs at least.
+/// Least number of points of a plane, the pixel itself included.
 const LEAST: usize = 6;
-/// Least share of a full window's spread that each direction across a plane needs.
+/// Least ratio of the fitted points' scatter to that of a full window.
 const SPREAD_MIN: f64 = 0.1;
 
 /// The normals of a range image.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Slopes {
-    /// Unit normals, away from the sensor; none where too few neighbours belong together.
+    /// Unit normals, away from the sensor; `None` with too few neighbours.
     pub(super) normals: Vec<Option<Vector3>>,
 }
 
 impl Slopes {
-    /// Of what a sensor saw, by windows of `radius_px` to each side.
+    /// Fits the normals of a range image, in windows of `radius_px` to each side.
     pub(super) fn of(sensor: &RangeSensor, image: &RangeImage, radius_px: usize) -> Self {
         let (width, height) = (image.width, image.height);
         let mut normals = Vec::with_capacity(width * height);
@@ -47,7 +47,7 @@ impl Slopes {
     }
 }
 
-/// The normal at a pixel that sees something.
+/// The normal at a pixel that has a depth.
 fn normal(sensor: &RangeSensor, image: &RangeImage, [x, y]: [usize; 2], radius_px: usize) -> Option<Vector3> {
     let depth_m = f64::from(image.depth_m[y * image.width + x]);
     let at = sensor.point(x, y, depth_m);
@@ -83,7 +83,7 @@ fn normal(sensor: &RangeSensor, image: &RangeImage, [x, y]: [usize; 2], radius_p
     let (xz, yz) = (xz - sx * sz / n, yz - sy * sz / n);
     let determinant = xx * yy - xy * xy;
     let reach = radius_px as f64 * pixel_m;
-    // Both spreads of a full window are n reach² (1 + 1/k) / 3.
+    // The scatter of a full window in x and in y is n reach² (1 + 1/k) / 3.
     let full = n * reach * reach / 3.0;
     if determinant < (SPREAD_MIN * full).powi(2) {
         return None;

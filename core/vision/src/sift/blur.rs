@@ -8,8 +8,8 @@
 //! | g | [`Kernel`] | – |
 //! | r | [`Kernel::radius`] | px |
 //!
-//! Beyond its edge the image goes on mirrored (… 2 1 0 1 2 …). A few rows are filtered downwards at a time, so that a
-//! pixel that was loaded counts for all of them, into lines that stay in the first cache; from there along.
+//! The image is mirrored at its edges (… 2 1 0 1 2 …). A few rows are filtered downwards at a time, so that each loaded
+//! pixel contributes to all of them, into lines that stay in the L1 cache; these are then filtered along the row.
 
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
@@ -19,15 +19,15 @@ use super::plane::Plane;
 
 /// Rows filtered at a time.
 const ROWS: usize = 4;
-/// Rows of a task of its own, a multiple of [`ROWS`].
+/// Rows of a parallel task, a multiple of [`ROWS`].
 const BAND: usize = 16;
-/// Vectors of a strip downwards, and along.
+/// Vectors of a strip, down the columns and along the rows.
 const DOWN: usize = 4;
 const ALONG: usize = 8;
-/// Where the kernel ends, in σ.
+/// Radius of the kernel, in σ.
 const EXTENT: f64 = 4.0;
 
-/// g.
+/// g: a sampled Gaussian.
 pub(super) struct Kernel {
     /// g from −r to r, between `ROWS` − 1 zeros on either side.
     taps: Vec<f32>,
@@ -51,7 +51,7 @@ impl Kernel {
     }
 }
 
-/// Makes the rows of B above `end` for which the image's rows are there.
+/// Computes the rows of B above `end` whose input rows are available.
 pub(super) fn blur(source: &Plane, kernel: &Kernel, blurred: &mut Plane, end: usize) {
     let radius = kernel.radius();
     let possible =
@@ -68,14 +68,14 @@ pub(super) fn blur(source: &Plane, kernel: &Kernel, blurred: &mut Plane, end: us
     }
 }
 
-/// The pixel that pixel `at` of a mirrored row of `side` pixels shows.
+/// Index of the pixel of a row of `side` pixels at position `at` of its mirrored extension.
 fn mirrored(at: isize, side: usize) -> usize {
     let period = (2 * (side as isize - 1)).max(1);
     let at = at.rem_euclid(period);
     at.min(period - at) as usize
 }
 
-/// Room for a few lines, and where the rows that count for them begin.
+/// Buffers for a few lines, and start indices of their input rows.
 #[derive(Default)]
 struct Scratch {
     lines: Vec<Line>,
@@ -86,7 +86,7 @@ struct Scratch {
 struct Band<'a> {
     source: &'a Plane,
     kernel: &'a Kernel,
-    /// The first row.
+    /// Index of the first row.
     top: usize,
     rows: &'a mut [f32],
     scratch: &'a mut Scratch,
@@ -122,7 +122,7 @@ impl WithSimd for Band<'_> {
     }
 }
 
-/// The lines of a block of rows, all of their columns.
+/// Filters a block of rows downwards, in all columns.
 #[inline(always)]
 fn down_all<S: Simd>(
     simd: S,
@@ -146,13 +146,13 @@ fn down_all<S: Simd>(
 /// A strip of `X` vectors of the lines.
 struct Down<'a, const X: usize> {
     values: &'a [f32],
-    /// Where the rows that count begin.
+    /// Start indices of the input rows.
     starts: &'a [usize],
     taps: &'a [f32],
-    /// The first vector.
+    /// Index of the first vector.
     x: usize,
     lines: &'a mut [f32],
-    /// Numbers before the first pixel of a line, and of a line.
+    /// Values before the first pixel of a line, and length of a line.
     margin: usize,
     length: usize,
 }
@@ -183,7 +183,7 @@ impl<const X: usize> WithSimd for Down<'_, X> {
     }
 }
 
-/// A row of B from a line that begins r pixels before it.
+/// Filters a row of B from a line that begins r pixels before it.
 #[inline(always)]
 fn along_all<S: Simd>(simd: S, line: &[f32], taps: &[f32], row: &mut [f32]) {
     let vectors = row.len() / S::F32_LANES;
@@ -202,7 +202,7 @@ fn along_all<S: Simd>(simd: S, line: &[f32], taps: &[f32], row: &mut [f32]) {
 struct Along<'a, const X: usize> {
     line: &'a [f32],
     taps: &'a [f32],
-    /// The first vector.
+    /// Index of the first vector.
     x: usize,
     row: &'a mut [f32],
 }

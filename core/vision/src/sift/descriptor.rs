@@ -1,6 +1,6 @@
-//! What a keypoint's surroundings look like: 4 × 4 histograms of 8 directions of the gradient.
+//! SIFT descriptor: 4 × 4 histograms of gradient directions in 8 bins around a keypoint.
 //!
-//! In a frame turned by the keypoint's direction θ, with cells 3σ wide, pixel (x, y) at (dx, dy) from the keypoint has
+//! In a frame rotated by the keypoint's direction θ, with cells 3σ wide, pixel (x, y) at (dx, dy) from the keypoint has
 //!
 //! ```text
 //! c = ( dx cos θ + dy sin θ)/(3σ) + 3/2       r = (−dx sin θ + dy cos θ)/(3σ) + 3/2
@@ -11,16 +11,15 @@
 //! |---|---|---|
 //! | σ, θ | `sigma`, `orientation_rad` | px of the octave, rad |
 //! | r, c, o | row, column and direction as cells | – |
-//! | h(i, j, k) | number 8 (4i + j) + k of the [`Descriptor`] | – |
+//! | h(i, j, k) | element 8 (4i + j) + k of the [`Descriptor`] | – |
 //!
-//! h is made a unit vector, cut at 0.2, made a unit vector again and written as 512 times itself, 255 at most. Directions
-//! are counted against the turn of the frame (o grows as the direction falls), as OpenCV and Lowe's program have it: the
-//! numbers can be compared with theirs. The keypoint's place counts below the pixel, where OpenCV takes the nearest
-//! pixel.
+//! h is normalised, clamped at 0.2, normalised again and stored as 512 times itself, at most 255. Directions are counted
+//! against the rotation of the frame (o grows as the direction falls), as in OpenCV and Lowe's program, so that the
+//! elements are comparable. The keypoint's position is used at sub-pixel precision; OpenCV uses the nearest pixel.
 //!
-//! The sum is a product of matrices: 16 cells × 8 directions, summed over the pixels. Pixels lie side by side in a vector,
-//! 16 sums of a row of cells stay in registers, and a vector of pixels is left out of the rows of cells that it does not
-//! touch.
+//! The sum is a product of matrices: 16 cells × 8 directions, summed over the pixels. Pixels are side by side in a
+//! vector, 16 sums of a row of cells stay in registers, and a vector of pixels is skipped for the rows of cells that it
+//! does not touch.
 
 use std::f32::consts::TAU;
 
@@ -34,24 +33,24 @@ use super::plane::Plane;
 use super::scale_space::Octave;
 use super::{Keypoint, Place};
 
-/// h as bytes.
+/// h as 128 bytes.
 pub type Descriptor = [u8; NUMBERS];
 
-/// Cells along a side, and directions.
+/// Number of directions; number of elements of a descriptor.
 const DIRECTIONS: usize = 8;
 const NUMBERS: usize = CELLS * CELLS * DIRECTIONS;
 /// Directions summed at a time.
 const HALF: usize = DIRECTIONS / 2;
-/// The weights' standard deviation in cells.
+/// Standard deviation of the weights, in cells.
 const WEIGHT_SIGMA: f32 = 0.5 * CELLS as f32;
-/// Largest share of the length that one number may have, and what the length becomes.
+/// Upper bound of an element as a fraction of the norm, and norm of the stored descriptor.
 const LARGEST: f32 = 0.2;
 const LENGTH: f32 = 512.0;
 
-/// Vectors that a vector of pixels becomes: t(r − i) m, t(c − j), t(o − k).
+/// Factors per vector of pixels: t(r − i) m, t(c − j), t(o − k).
 const PARTS: usize = CELLS + CELLS + DIRECTIONS;
 
-/// The descriptors of keypoints of an octave.
+/// Computes the descriptors of keypoints of an octave.
 pub(super) fn describe(octave: &Octave, keypoints: &[(Place, Keypoint)]) -> Vec<Descriptor> {
     let scale = octave.input_px() as f32;
     let describe_one = |samples: &mut Samples, (_, keypoint): &(Place, Keypoint)| {
@@ -68,7 +67,7 @@ pub(super) fn describe(octave: &Octave, keypoints: &[(Place, Keypoint)]) -> Vec<
     keypoints.par_iter().map_init(Samples::default, describe_one).collect()
 }
 
-/// h as a descriptor.
+/// Converts h to a descriptor.
 fn bytes_of(histogram: &[f32; NUMBERS]) -> Descriptor {
     let length = |values: &[f32; NUMBERS]| values.iter().map(|v| v * v).sum::<f32>().sqrt();
     let most = LARGEST * length(histogram);
@@ -77,7 +76,7 @@ fn bytes_of(histogram: &[f32; NUMBERS]) -> Descriptor {
     cut.map(|value| (value * scale).round() as u8)
 }
 
-/// Where a descriptor is taken, px of the octave.
+/// Position, scale and direction of a descriptor, px of the octave.
 struct Window<'a> {
     layer: &'a Plane,
     place: [f32; 2],
@@ -90,14 +89,14 @@ struct Window<'a> {
 struct Samples {
     /// `PARTS` vectors for each vector of pixels.
     parts: Vec<Line>,
-    /// The vectors of pixels that touch each row of cells.
+    /// Indices of the vectors of pixels that touch each row of cells.
     touching: [Vec<usize>; CELLS],
-    /// exp(−dx²/(2 (6σ)²)) of the columns and likewise of the rows.
+    /// exp(−dx²/(2 (6σ)²)) of the columns, and the same for the rows.
     across: Vec<f32>,
     down: Vec<f32>,
 }
 
-/// h of a window.
+/// Computes h of a window.
 struct Describe<'a> {
     window: Window<'a>,
     samples: &'a mut Samples,
@@ -122,7 +121,7 @@ impl WithSimd for Describe<'_> {
     }
 }
 
-/// Takes the samples of a window.
+/// Computes the factors of a window's pixels.
 #[inline(always)]
 fn take<S: Simd>(simd: S, window: &Window<'_>, samples: &mut Samples) {
     let Window { layer, place: [x, y], sigma, orientation_rad } = *window;
@@ -175,11 +174,11 @@ fn row_of_cells([cos, sin]: [f32; 2], dx: f32, dy: f32) -> f32 {
     dy * cos - dx * sin + 0.5 * (CELLS as f32 - 1.0)
 }
 
-/// From which dx to which a row lies in the window.
+/// Range of dx in which a row is inside the window.
 #[inline(always)]
 fn span([cos, sin]: [f32; 2], dy: f32) -> [f32; 2] {
     let mut span = [f32::NEG_INFINITY, f32::INFINITY];
-    // |slope dx + offset| ≤ the half side.
+    // |slope dx + offset| ≤ half the side.
     for (slope, offset) in [(cos, dy * sin), (-sin, dy * cos)] {
         let (a, b) = ((-WINDOW - offset) / slope, (WINDOW - offset) / slope);
         if a.is_finite() && b.is_finite() {
@@ -191,7 +190,7 @@ fn span([cos, sin]: [f32; 2], dy: f32) -> [f32; 2] {
     span
 }
 
-/// The factors of a vector of pixels, the first of which is at (dx, dy): t(r − i) m, t(c − j), t(o − k).
+/// Computes the factors of a vector of pixels, the first of which is at (dx, dy): t(r − i) m, t(c − j), t(o − k).
 #[inline(always)]
 fn factors<S: Simd>(
     simd: S,
@@ -209,13 +208,13 @@ fn factors<S: Simd>(
     let row = simd.mul_add_e_f32s(dx, simd.splat_f32s(-sin), simd.splat_f32s(dy * cos + middle));
     let turn = simd.sub_f32s(simd.splat_f32s(orientation_rad), direction);
     let turn = simd.mul_f32s(turn, simd.splat_f32s(DIRECTIONS as f32 / TAU));
-    // A full circle is added to what is negative: 4 less 4 with its sign.
+    // Adds a full circle to negative values: 4 minus 4 with the sign of the value.
     let half = simd.splat_f32s(HALF as f32);
     let signed = simd.or_f32s(half, simd.and_f32s(turn, simd.splat_f32s(-0.0)));
     let turn = simd.add_f32s(turn, simd.sub_f32s(half, signed));
     let mass = simd.mul_f32s(length, weights);
     for i in 0..CELLS {
-        // 1 − |a| is the lesser of 1 − a and 1 + a.
+        // 1 − |a| is the minimum of 1 − a and 1 + a.
         let (below, above) = (simd.splat_f32s(1.0 - i as f32), simd.splat_f32s(1.0 + i as f32));
         let tent = simd.min_f32s(simd.add_f32s(row, below), simd.sub_f32s(above, row));
         part[i] = simd.mul_f32s(mass, simd.max_f32s(tent, zero));
@@ -226,14 +225,14 @@ fn factors<S: Simd>(
         let (below, above) = (simd.splat_f32s(1.0 - k as f32), simd.splat_f32s(1.0 + k as f32));
         let mut tent = simd.min_f32s(simd.add_f32s(turn, below), simd.sub_f32s(above, turn));
         if k == 0 {
-            // A little less than a full circle is near it as well.
+            // Values just below a full circle are also near bin 0.
             tent = simd.max_f32s(tent, simd.sub_f32s(turn, simd.splat_f32s(DIRECTIONS as f32 - 1.0)));
         }
         part[2 * CELLS + k] = simd.max_f32s(tent, zero);
     }
 }
 
-/// Half of the directions of a row of cells.
+/// Sums half of the directions of a row of cells.
 struct Sum<'a> {
     parts: &'a [f32],
     touching: &'a [usize],

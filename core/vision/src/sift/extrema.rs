@@ -1,8 +1,8 @@
-//! Extrema of the difference of Gaussians below the pixel, without the weak ones and the edges.
+//! Extrema of the difference of Gaussians at sub-pixel precision, without those of low contrast or on edges.
 //!
 //! ```text
 //! x̂ = −H⁻¹ g              g, H: gradient and second derivatives of D along (x, y, layer), by central differences
-//! |x̂_i| > ½               moves to the neighbour and starts again, 5 times at most
+//! |x̂_i| > ½               moves to the neighbour and repeats, at most 5 times
 //! |D(x̂)| ≥ contrast_min   D(x̂) = D + ½ gᵀ x̂
 //! Tr(H_xy)²/Det(H_xy) < (r + 1)²/r,   Det > 0
 //! ```
@@ -11,8 +11,8 @@
 //! | x̂ | [`Extremum::offset`] | px of the octave, layers |
 //! | r | `edge_ratio_max` of the settings | – |
 //!
-//! Two neighbouring pixels can lead to one and the same place, which is then found twice. And two can lead to each other,
-//! when the extremum lies just between them: it is lost then, here as in Lowe's recipe and OpenCV.
+//! Two neighbouring pixels may converge to the same extremum, which is then found twice. Two may also lead to each other
+//! if the extremum is just between them; it is then lost, as in Lowe's method and OpenCV.
 
 use std::ops::Range;
 
@@ -25,35 +25,35 @@ use super::plane::Plane;
 use super::scale_space::{BORDER, Octave};
 use super::scan::{self, Candidate};
 
-/// Moves to a neighbour at most.
+/// Largest number of refinement steps.
 const STEPS_MAX: usize = 5;
-/// Share of the least contrast that the pixel itself must have.
+/// Contrast of the pixel itself, as a fraction of the least contrast.
 const PIXEL_SHARE: f64 = 0.5;
 
-/// An extremum below the pixel.
+/// An extremum at sub-pixel precision.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Extremum {
-    /// The nearest layer and pixel.
+    /// The nearest pixel and layer.
     pub(super) pixel: Candidate,
-    /// From there, along (x, y, layer).
+    /// Offset from there, along (x, y, layer).
     offset: [f64; 3],
     /// D(x̂).
     pub(super) contrast: f64,
 }
 
 impl Extremum {
-    /// Its place (x, y), px of the octave.
+    /// Position (x, y), px of the octave.
     pub(super) fn place(&self) -> [f64; 2] {
         [self.pixel.x as f64 + self.offset[0], self.pixel.y as f64 + self.offset[1]]
     }
 
-    /// Its scale as a layer and a fraction.
+    /// Scale as a fractional layer.
     pub(super) fn layer_exact(&self) -> f64 {
         self.pixel.layer as f64 + self.offset[2]
     }
 }
 
-/// The extrema of some rows of an octave, in the order of layer, row and column.
+/// Finds the extrema in some rows of an octave, in the order of layer, row and column.
 pub(super) fn find(octave: &Octave, rows: Range<usize>, settings: &SiftSettings) -> Vec<Extremum> {
     let threshold = (PIXEL_SHARE * settings.contrast_min) as f32;
     let candidates = scan::extrema(octave, rows, threshold);
@@ -63,7 +63,7 @@ pub(super) fn find(octave: &Octave, rows: Range<usize>, settings: &SiftSettings)
     extrema
 }
 
-/// The extremum near a pixel.
+/// Refines the extremum near a pixel; `None` if it is rejected.
 fn refine(octave: &Octave, candidate: Candidate, settings: &SiftSettings) -> Option<Extremum> {
     let Candidate { layer, y, x } = candidate;
     let [width, height] = octave.size();
@@ -80,7 +80,7 @@ fn refine(octave: &Octave, candidate: Candidate, settings: &SiftSettings) -> Opt
         let offset = hessian.lu().solve(&-gradient)?;
         if offset.amax() > 0.5 {
             for (at, step) in at.iter_mut().zip(offset.iter()) {
-                // A step beyond the first pixel ends at it, outside all the same.
+                // A step past the first pixel saturates at 0, which is outside too.
                 *at = (*at as f64 + step.round()) as usize;
             }
             if !is_inside(at) {
@@ -100,7 +100,7 @@ fn refine(octave: &Octave, candidate: Candidate, settings: &SiftSettings) -> Opt
     None
 }
 
-/// Whether D is curved in one direction only.
+/// Returns whether D is strongly curved in one direction only.
 fn is_edge(hessian: &Matrix3<f64>, ratio_max: f64) -> bool {
     let trace = hessian[(0, 0)] + hessian[(1, 1)];
     let determinant = hessian[(0, 0)] * hessian[(1, 1)] - hessian[(0, 1)] * hessian[(1, 0)];

@@ -1,12 +1,12 @@
-//! Length and direction of the gradient of many pixels at once, and weights that fall off as a Gaussian.
+//! Magnitude and direction of the gradient of many pixels at once, and Gaussian weights.
 //!
 //! ```text
 //! dx = I(x + 1, y) − I(x − 1, y)     dy = I(x, y + 1) − I(x, y − 1)
 //! length = sqrt(dx² + dy²)           direction = atan2(dy, dx), from −π to π
 //! ```
-//! With q = (|dy| − |dx|)/(|dx| + |dy|) the direction is π/4 + atan q in the first quadrant; the signs of dx and dy turn it
-//! into the others. The arc tangent for |q| ≤ 1 is an odd polynomial of degree 11, right to 2e-6 rad; the bins that it
-//! falls into are 0.17 rad wide and wider.
+//! With q = (|dy| − |dx|)/(|dx| + |dy|) the direction is π/4 + atan q in the first quadrant; the signs of dx and dy
+//! select the quadrant. The arc tangent for |q| ≤ 1 is an odd polynomial of degree 11, accurate to 2e-6 rad; the bins of
+//! the histograms are at least 0.17 rad wide.
 
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
 
@@ -15,18 +15,18 @@ use pulp::Simd;
 use super::lanes::load;
 use super::plane::Plane;
 
-/// Coefficients of q¹¹, q⁹ … q: the least greatest error over 0 … 1.
+/// Coefficients of q¹¹, q⁹ … q: minimax fit over 0 … 1.
 const ARC_TANGENT: [f32; 6] =
     [-0.011_719_08, 0.052_647_203, -0.116_426_34, 0.193_540_32, -0.332_622_83, 0.999_977_23];
-/// Keeps the division of a flat place from being 0/0.
+/// Avoids 0/0 in flat areas.
 const TINY: f32 = 1e-30;
 
-/// A pixel's row and those above and below it, from their first column on.
+/// A pixel's row and those above and below it, starting at their first column.
 pub(super) fn rows_around(plane: &Plane, y: usize) -> [&[f32]; 3] {
     [plane.row(y - 1), plane.row(y), plane.row(y + 1)]
 }
 
-/// Length and direction at the vector of pixels from column `x` on, which is not the first.
+/// Magnitude and direction of the vector of pixels starting at column `x` ≥ 1.
 #[inline(always)]
 pub(super) fn polar<S: Simd>(simd: S, [above, here, below]: [&[f32]; 3], x: usize) -> (S::f32s, S::f32s) {
     let dx = simd.sub_f32s(load::<S>(here, x + 1), load::<S>(here, x - 1));
@@ -38,7 +38,7 @@ pub(super) fn polar<S: Simd>(simd: S, [above, here, below]: [&[f32]; 3], x: usiz
 /// atan2(dy, dx).
 #[inline(always)]
 fn direction<S: Simd>(simd: S, dx: S::f32s, dy: S::f32s) -> S::f32s {
-    // Signs are moved about as bits: nothing is chosen between, which costs more.
+    // Signs are copied as bits: selects would be slower.
     let (sign, length) = (simd.splat_f32s(-0.0), simd.splat_f32s(f32::from_bits(0x7FFF_FFFF)));
     let (wide, high) = (simd.and_f32s(dx, length), simd.and_f32s(dy, length));
     let both = simd.add_f32s(simd.add_f32s(wide, high), simd.splat_f32s(TINY));
@@ -48,14 +48,14 @@ fn direction<S: Simd>(simd: S, dx: S::f32s, dy: S::f32s) -> S::f32s {
     for coefficient in &ARC_TANGENT[1..] {
         value = simd.mul_add_e_f32s(value, square, simd.splat_f32s(*coefficient));
     }
-    // From the vertical: π/2 − (π/4 + atan q), on the side of dx.
+    // From the vertical: π/2 − (π/4 + atan q), with the sign of dx.
     let upright = simd.negate_mul_add_e_f32s(value, q, simd.splat_f32s(FRAC_PI_4));
     let upright = simd.xor_f32s(upright, simd.and_f32s(dx, sign));
     let lower = simd.sub_f32s(simd.splat_f32s(FRAC_PI_2), upright);
     simd.xor_f32s(lower, simd.and_f32s(dy, sign))
 }
 
-/// exp(−(i − centre)²/(2σ²)) of the whole numbers `pixels`, then `after` zeros.
+/// exp(−(i − centre)²/(2σ²)) of the integers `pixels`, then `after` zeros.
 pub(super) fn gaussian_weights(
     pixels: std::ops::RangeInclusive<usize>,
     centre: f32,
@@ -66,7 +66,7 @@ pub(super) fn gaussian_weights(
     weights.clear();
     let sharpness = 0.5 / (f64::from(sigma) * f64::from(sigma));
     let from = *pixels.start() as f64 - f64::from(centre);
-    // From one weight to the next is a factor, which itself changes by a factor.
+    // The ratio of consecutive weights itself changes by a constant factor.
     let mut weight = (-sharpness * from * from).exp();
     let mut factor = (-sharpness * (2.0 * from + 1.0)).exp();
     let change = (-2.0 * sharpness).exp();
@@ -78,7 +78,7 @@ pub(super) fn gaussian_weights(
     weights.resize(weights.len() + after, 0.0);
 }
 
-/// The pixels of a side that lie within `reach` of `centre`, without the first and the last of the side.
+/// The pixels of a side within `reach` of `centre`, without the first and the last of the side.
 pub(super) fn inner(centre: f32, reach: f32, side: usize) -> std::ops::RangeInclusive<usize> {
     let first = (centre - reach).ceil().max(1.0) as usize;
     let last = ((centre + reach).floor().max(0.0) as usize).min(side.saturating_sub(2));

@@ -1,56 +1,56 @@
-//! Nearest descriptors (R158, R161).
+//! Matching of descriptors by their nearest neighbours (R158, R161).
 //!
 //! ```text
 //! |a − b|² = Σ (a_i − b_i)²               ratio = |q − nearest| / |q − second nearest|
 //! ```
-//! Distances are exact: whole numbers. Without a constraint they come from a product of matrices (`products`); with one,
-//! which mostly leaves few, one after the other.
+//! Distances are exact integers. Without a constraint they are computed by a product of matrices (`products`); with one,
+//! which usually leaves few pairs, one by one.
 
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::{Descriptor, products};
 
-/// The two nearest of a set; squared Euclidean distances. Of equal ones the lower index counts.
+/// The two nearest neighbours in a set; squared Euclidean distances. Of equal ones the lower index counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Neighbours {
-    /// Index of the nearest.
+    /// Index of the nearest neighbour.
     pub nearest: u32,
-    /// Its squared distance.
+    /// Squared distance of the nearest.
     pub distance2: u32,
-    /// That of the second nearest, where there is one.
+    /// Squared distance of the second nearest; `None` in a set of one.
     pub second_distance2: Option<u32>,
 }
 
 /// A pair of descriptors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Match {
-    /// Index into the one set.
+    /// Index into the query set.
     pub query: u32,
-    /// Index into the other.
+    /// Index into the train set.
     pub train: u32,
     /// Euclidean distance.
     pub distance: f32,
-    /// This distance over that of the second nearest (1 where both are 0), where there is one.
+    /// Distance over that of the second nearest (1 if both are 0); `None` without a second.
     pub ratio: Option<f32>,
 }
 
-/// Which nearest neighbours are matches.
+/// Criteria for a nearest neighbour to be a match.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MatchSettings {
-    /// Greatest ratio of the distances to the nearest and the second nearest; Lowe: 0.8. Without a second nearest there is
-    /// nothing to doubt the match.
+    /// Largest ratio of the distances to the nearest and the second nearest (Lowe: 0.8); `None`: no limit. A match
+    /// without a second nearest passes.
     pub ratio_max: Option<f64>,
-    /// Whether each must be the other's nearest.
+    /// Whether each must be the other's nearest neighbour.
     pub mutual: bool,
 }
 
-/// The nearest neighbours in `train` of each of `query`; none where `train` is empty.
+/// The nearest neighbours in `train` of each of `query`; `None` if `train` is empty.
 pub fn nearest(query: &[Descriptor], train: &[Descriptor]) -> Vec<Option<Neighbours>> {
     products::nearest(query, train)
 }
 
-/// The nearest neighbours among those that `allowed` (index into `query`, index into `train`) lets through.
+/// The nearest neighbours among the pairs that `allowed` (index into `query`, index into `train`) accepts.
 pub fn nearest_where(
     query: &[Descriptor],
     train: &[Descriptor],
@@ -63,7 +63,7 @@ pub fn nearest_where(
     query.par_iter().enumerate().map(of_one).collect()
 }
 
-/// The nearest neighbours of a query among some of the others, one after the other.
+/// Finds the nearest neighbours of a query among some of the train descriptors, one by one.
 struct Among<'a> {
     query: &'a Descriptor,
     train: &'a [Descriptor],
@@ -92,7 +92,7 @@ impl WithSimd for Among<'_> {
     }
 }
 
-/// |a − b|², at most 128 · 255². (Checks for an overflow that cannot be would keep the sum from being taken many at once.)
+/// |a − b|², at most 128 · 255². Wrapping arithmetic, because checks of an impossible overflow would prevent vectorisation.
 #[inline(always)]
 pub fn distance2(a: &Descriptor, b: &Descriptor) -> u32 {
     let mut sum = 0_i32;
@@ -103,13 +103,13 @@ pub fn distance2(a: &Descriptor, b: &Descriptor) -> u32 {
     sum.cast_unsigned()
 }
 
-/// The matches of two sets, in the order of `query`.
+/// The matches between two sets, in the order of `query`.
 pub fn matches(query: &[Descriptor], train: &[Descriptor], settings: &MatchSettings) -> Vec<Match> {
     let back = settings.mutual.then(|| nearest(train, query));
     select(&nearest(query, train), back.as_deref(), settings)
 }
 
-/// The matches among the pairs that `allowed` (index into `query`, index into `train`) lets through.
+/// The matches among the pairs that `allowed` (index into `query`, index into `train`) accepts.
 pub fn matches_where(
     query: &[Descriptor],
     train: &[Descriptor],
@@ -120,7 +120,7 @@ pub fn matches_where(
     select(&nearest_where(query, train, &allowed), back.as_deref(), settings)
 }
 
-/// The neighbours that the settings let through.
+/// Selects the neighbours that pass the settings.
 fn select(
     neighbours: &[Option<Neighbours>],
     back: Option<&[Option<Neighbours>]>,

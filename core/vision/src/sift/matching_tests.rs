@@ -1,8 +1,8 @@
-//! Nearest descriptors beside a loop over all pairs.
+//! Nearest descriptors compared with a loop over all pairs.
 
 use super::*;
 
-/// Descriptors like those of images: most numbers small, hashed.
+/// Pseudo-random descriptors, with mostly small elements as in those of images.
 fn descriptors(count: usize, seed: u32) -> Vec<Descriptor> {
     let hash = |i: u32| {
         let h = (i ^ seed.wrapping_mul(0x9E37_79B1)).wrapping_mul(0x85EB_CA77);

@@ -1,11 +1,11 @@
-//! SIFT: points that are found again in other views, and what their surroundings look like (R157–R162, E26).
+//! SIFT: keypoints that are repeatable between views, with their descriptors (R157–R162, E26).
 //!
 //! Lowe, *Distinctive Image Features from Scale-Invariant Keypoints*, IJCV 2004; the constants as in domain.md 12.1.
 //!
 //! ```text
 //! G(σ)     the image blurred to σ                                     octaves of s + 3 images, k = 2^(1/s)
 //! D_l    = G(k^(l+1) σ₀) − G(k^l σ₀)                                  difference of Gaussians, l = 0 … s + 1
-//! x̂      = −H⁻¹ ∇D        D(x̂) = D + ½ ∇Dᵀ x̂                          an extremum of both signs, below the pixel
+//! x̂      = −H⁻¹ ∇D        D(x̂) = D + ½ ∇Dᵀ x̂                          an extremum of either sign, sub-pixel
 //! σ(x̂)   = σ₀ · 2^((l + x̂_scale)/s) · 2^octave
 //! ```
 //! | symbol | our name | unit |
@@ -14,29 +14,29 @@
 //! | σ₀ | [`SiftSettings::sigma`] | px of the octave |
 //! | x̂ | [`Keypoint::x`], [`Keypoint::y`], [`Keypoint::sigma_px`] | px of the input image |
 //! | D(x̂) | [`Keypoint::contrast`] | fraction of full scale |
-//! | l | [`Keypoint::layer`], nearest to x̂ | – |
+//! | l | [`Keypoint::layer`], the nearest to x̂ | – |
 //!
-//! | file | what it does |
+//! | file | contents |
 //! |---|---|
-//! | `scale_space` | one octave after the other: its Gaussians |
+//! | `scale_space` | the Gaussians of one octave after the other |
 //! | `blur` | the separable Gaussian filter |
-//! | `plane` | an image whose rows begin at cache lines |
-//! | `validity` | keeps features away from invalid pixels |
-//! | `scan` | pixels that are greater or less than all 26 neighbours |
-//! | `extrema` | their places below the pixel; weak ones and edges rejected |
-//! | `gradient` | length and direction of the gradient, many pixels at once |
-//! | `orientation` | the directions that most gradients around a keypoint share |
-//! | `descriptor` | the 4 × 4 histograms of gradients around it |
+//! | `plane` | an image with rows aligned to cache lines |
+//! | `validity` | rejection of features near invalid pixels |
+//! | `scan` | pixels greater or less than all 26 neighbours |
+//! | `extrema` | their sub-pixel positions; low contrast and edges rejected |
+//! | `gradient` | magnitude and direction of the gradient, many pixels at once |
+//! | `orientation` | the dominant gradient directions around a keypoint |
+//! | `descriptor` | the 4 × 4 histograms of gradients around a keypoint |
 //! | `matching` | nearest descriptors |
-//! | `products` | those of all by a product of matrices |
-//! | `lanes` | slices of numbers as the processor's vectors |
+//! | `products` | all nearest neighbours by a product of matrices |
+//! | `lanes` | slices of `f32` as the processor's vectors |
 //!
-//! Pixel (x, y) of octave o lies on pixel (2^o x, 2^o y) of the input image, with no half pixel between: the doubled
-//! image of octave −1 is sampled *at* the pixels and half-way between them. (OpenCV's default is a quarter pixel off,
-//! its `enable_precise_upscale` is not.)
+//! Pixel (x, y) of octave o is centred on pixel (2^o x, 2^o y) of the input image, without a half-pixel shift: the
+//! doubled image of octave −1 is sampled *at* the pixels and half-way between them. (OpenCV's default is shifted by a
+//! quarter pixel, its `enable_precise_upscale` is not.)
 //!
-//! Everything is computed for each pixel or keypoint by itself, in an order that does not depend on the number of
-//! threads: the same image gives the same bits.
+//! Each pixel and keypoint is computed independently, in an order that does not depend on the number of threads: the
+//! same image gives the same bits.
 
 mod lanes;
 mod plane;
@@ -72,19 +72,19 @@ pub use matching::{Match, MatchSettings, Neighbours, matches, matches_where, nea
 pub struct SiftSettings {
     /// Whether the first octave is the image at twice its size; about four times as many features.
     pub double_image: bool,
-    /// s: scales at which extrema are looked for in each octave.
+    /// s: number of scales per octave at which extrema are searched for.
     pub scales_per_octave: u32,
     /// σ₀: blur of the first image of each octave, px of that octave.
     pub sigma: f64,
-    /// The blur that the camera has left in the image, px.
+    /// Assumed blur of the input image, px.
     pub image_blur_px: f64,
     /// Least |D(x̂)|, for intensities from 0 to 1.
     pub contrast_min: f64,
-    /// Largest ratio of the principal curvatures of D: more is an edge.
+    /// Largest ratio of the principal curvatures of D; above it the extremum is on an edge.
     pub edge_ratio_max: f64,
-    /// Share of the highest peak of the histogram of directions from which on another one gives a feature as well.
+    /// Fraction of the highest peak of the direction histogram above which another peak gives an additional feature.
     pub orientation_peak: f64,
-    /// How many features are kept, the strongest by |D(x̂)|; 0: all.
+    /// Largest number of features, the strongest by |D(x̂)|; 0: no limit.
     pub features_max: u32,
 }
 
@@ -103,18 +103,18 @@ impl Default for SiftSettings {
     }
 }
 
-/// A place of the image with a scale and a direction of its own.
+/// A position in the image with a scale and a direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Keypoint {
     /// Column, px of the input image; 0 is the centre of the first pixel.
     pub x: f32,
-    /// Row, likewise.
+    /// Row, px of the input image.
     pub y: f32,
     /// Scale, px of the input image: the blur at which the difference of Gaussians is extremal.
     pub sigma_px: f32,
     /// Direction of the gradients, from −π to π: 0 along +x, positive towards +y (down).
     pub orientation_rad: f32,
-    /// D(x̂), fraction of full scale: positive for dark places on bright ground.
+    /// D(x̂), fraction of full scale: positive for dark blobs on a bright background.
     pub contrast: f32,
     /// −1 is the doubled image, 0 the size of the input image.
     pub octave: i8,
@@ -125,23 +125,23 @@ pub struct Keypoint {
 /// Keypoints and their descriptors, in the same order: octave, layer, row, column, direction.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Features {
-    /// Where.
+    /// Positions, scales and directions.
     pub keypoints: Vec<Keypoint>,
-    /// What it looks like there.
+    /// Descriptors of the keypoints.
     pub descriptors: Vec<Descriptor>,
 }
 
-/// The features of an image.
+/// Detects the features of an image.
 ///
-/// Values are fractions of full scale. An invalid pixel (NaN) keeps every feature away whose descriptor it would
-/// change. An image too small for a single octave, or flat, has no features; nor has any with settings that
-/// describe no scale space (a σ or a number of scales that is not positive).
+/// Values are fractions of full scale. No feature depends on an invalid pixel (NaN): those whose descriptor would are
+/// rejected. Images that are flat or too small for a single octave have no features, and invalid settings (a σ or a
+/// number of scales that is not positive) give none.
 pub fn detect(image: &GrayImage, settings: &SiftSettings) -> Features {
-    // Nobody can cancel it.
+    // The default token is never cancelled.
     detect_until(image, settings, Cancel::default()).unwrap_or_default()
 }
 
-/// [`detect`], which ends within some rows of an octave once `cancel` is requested.
+/// As [`detect`], but ends within some rows of an octave once `cancel` is requested.
 ///
 /// # Errors
 /// [`Error::Cancelled`](sightline_geometry::error::Error::Cancelled).
@@ -166,7 +166,7 @@ pub fn detect_until(image: &GrayImage, settings: &SiftSettings, cancel: Cancel<'
     Ok(strongest.features())
 }
 
-/// Where a feature stands among all: octave, layer, row and column.
+/// Sort key of a feature: octave, layer, row and column.
 type Place = (i32, Candidate);
 
 /// The keypoints of an extremum: one for each direction.
@@ -190,11 +190,11 @@ fn orient(octave: &Octave, extremum: &Extremum, settings: &SiftSettings) -> Vec<
     directions.into_iter().map(|direction| (place, keypoint(direction))).collect()
 }
 
-/// The features found so far, or as many of them as are wanted.
+/// The features found so far, or the strongest of them.
 struct Strongest {
-    /// How many; 0: all.
+    /// Largest number of features; 0: no limit.
     count: usize,
-    /// What one more must exceed, once there are so many.
+    /// Contrast that a further feature must exceed once that number is reached.
     floor: f32,
     features: Vec<((Place, Keypoint), Descriptor)>,
 }
@@ -204,7 +204,7 @@ impl Strongest {
         Self { count: count as usize, floor: -1.0, features: Vec::new() }
     }
 
-    /// Whether a feature of this contrast would be kept, as far as is known.
+    /// Returns whether a feature of this contrast may be kept; later features may still displace it.
     fn may_keep(&self, contrast: f64) -> bool {
         contrast.abs() as f32 > self.floor
     }
@@ -220,7 +220,7 @@ impl Strongest {
         }
     }
 
-    /// All that are kept, in order.
+    /// Returns the kept features, in order.
     fn features(mut self) -> Features {
         self.features.sort_by_key(|((place, _), _)| *place);
         let (keypoints, descriptors) =

@@ -1,4 +1,4 @@
-//! The directions that most gradients around a keypoint share.
+//! Dominant gradient directions around a keypoint.
 //!
 //! ```text
 //! h(b) = Σ |∇G| exp(−d²/(2 (1.5σ)²))    over pixels whose direction is nearest to 2π b/36, up to 3 · 1.5σ away
@@ -7,7 +7,7 @@
 //! | symbol | our name | unit |
 //! |---|---|---|
 //! | σ | `sigma` | px of the octave |
-//! | d | distance from the keypoint's place below the pixel | px of the octave |
+//! | d | distance from the keypoint's sub-pixel position | px of the octave |
 
 use std::f32::consts::{PI, TAU};
 
@@ -17,21 +17,21 @@ use super::gradient::{gaussian_weights, inner, polar, rows_around};
 use super::lanes::{WIDEST, load, store};
 use super::plane::Plane;
 
-/// Bins of the full circle.
+/// Bins of the histogram over the full circle.
 const BINS: usize = 36;
-/// Room for the bins: a power of two.
+/// Length of the array of bins: a power of two.
 const ROOM: usize = 64;
-/// From here on numbers have no fraction.
+/// 2²³: `f32` values from here on have no fraction.
 const WHOLE: f32 = 8_388_608.0;
-/// The weights' standard deviation, and where they end, in σ.
+/// Standard deviation and radius of the weights, in σ.
 const WEIGHT_SIGMA: f32 = 1.5;
 const REACH: f32 = 3.0 * WEIGHT_SIGMA;
 
-/// The directions at a place (x, y), rad from −π to π; none where all is flat.
+/// The directions at a position (x, y), rad from −π to π; empty in a flat area.
 pub(super) fn directions(layer: &Plane, [x, y]: [f64; 2], sigma: f32, peak_share: f32) -> Vec<f32> {
     let mut histogram = [0.0; ROOM];
     Arch::new().dispatch(Fill { layer, place: [x as f32, y as f32], sigma, histogram: &mut histogram });
-    // The last bin is the first, after a full turn.
+    // Bin 36 is bin 0 after a full turn.
     histogram[0] += histogram[BINS];
     let at = |bin: usize, offset: usize| histogram[(bin + BINS + offset - 2) % BINS];
     let smooth: [f32; BINS] = std::array::from_fn(|bin| {
@@ -40,7 +40,7 @@ pub(super) fn directions(layer: &Plane, [x, y]: [f64; 2], sigma: f32, peak_share
     let highest = smooth.iter().copied().fold(0.0, f32::max);
     let direction = |bin: usize| {
         let (left, here, right) = (smooth[(bin + BINS - 1) % BINS], smooth[bin], smooth[(bin + 1) % BINS]);
-        // Of two equal bins side by side the first is the peak, and the parabola leads half-way to the other.
+        // Of two equal adjacent bins the first is the peak, and the parabola's vertex is half-way to the other.
         let is_peak = here > left && here >= right && here >= peak_share * highest;
         let exact = bin as f32 + 0.5 * (left - right) / (left - 2.0 * here + right);
         is_peak.then(|| wrapped(exact * (TAU / BINS as f32) - PI))
@@ -48,7 +48,7 @@ pub(super) fn directions(layer: &Plane, [x, y]: [f64; 2], sigma: f32, peak_share
     (0..BINS).filter_map(direction).collect()
 }
 
-/// The angle between −π and π.
+/// Wraps an angle to −π … π.
 fn wrapped(angle: f32) -> f32 {
     if angle < -PI {
         angle + TAU
@@ -59,7 +59,7 @@ fn wrapped(angle: f32) -> f32 {
     }
 }
 
-/// h, from direction −π on.
+/// Computes h, starting at direction −π.
 struct Fill<'a> {
     layer: &'a Plane,
     place: [f32; 2],
@@ -80,7 +80,7 @@ impl WithSimd for Fill<'_> {
         gaussian_weights(columns.clone(), x, WEIGHT_SIGMA * sigma, WIDEST, &mut across);
         gaussian_weights(rows.clone(), y, WEIGHT_SIGMA * sigma, 0, &mut down);
         let count = across.len() - WIDEST;
-        // The sum with 2²³ is rounded to a whole number, which its lowest bits hold.
+        // Adding 2²³ rounds to an integer, which is then in the lowest bits.
         let (scale, start) = (simd.splat_f32s(BINS as f32 / TAU), simd.splat_f32s(0.5 * BINS as f32 + WHOLE));
         let (mut bins, mut weights) = ([0.0_f32; WIDEST], [0.0_f32; WIDEST]);
         for (row, weight) in rows.zip(&down) {

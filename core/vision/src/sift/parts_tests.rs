@@ -1,4 +1,4 @@
-//! The parts of the detector beside their definitions, written out in double precision.
+//! Parts of the detector against their definitions in double precision.
 
 use std::f64::consts::TAU;
 
@@ -68,7 +68,7 @@ fn the_filter_is_the_gaussian_of_the_mirrored_image_however_few_rows_are_made_at
 #[test]
 fn of_equal_pixels_side_by_side_one_is_an_extremum() {
     let mut image = GrayImage::from_pixel(64, 64, Luma([0.3]));
-    // A square of 10 × 10 pixels is the same seen from each of its four middles.
+    // A square of 10 × 10 pixels is symmetric about each of its four central pixels.
     for (x, y) in (26..36).flat_map(|y| (26..36).map(move |x| (x, y))) {
         image.put_pixel(x, y, Luma([0.9]));
     }
@@ -81,7 +81,7 @@ fn of_equal_pixels_side_by_side_one_is_an_extremum() {
     assert!([30, 31].contains(&found[0].x) && [30, 31].contains(&found[0].y), "{found:?}");
 }
 
-/// h by the definition, as a descriptor before rounding.
+/// h by its definition, as a descriptor before rounding.
 fn defined(layer: &Plane, [x, y, sigma, orientation]: [f64; 4]) -> [f64; 128] {
     let mut h = [0.0; 128];
     let pixel = |x: usize, y: usize| f64::from(layer.row(y)[x]);
@@ -115,7 +115,7 @@ fn descriptors_are_those_of_the_definition_inside_and_at_the_edges() {
     let settings = SiftSettings { double_image: false, contrast_min: 0.01, ..SiftSettings::default() };
     let mut space = ScaleSpace::new(&image, &settings).unwrap();
     assert!(space.next_octave());
-    // All rows are made at once and held: the image is lower than the window.
+    // All rows are computed and kept: the image is lower than the window.
     while space.slide().is_some_and(|(_, rows)| rows.end < 85) {}
     let octave = space.octave();
     let place = (0, Candidate { layer: 0, y: 0, x: 0 });

@@ -1,30 +1,30 @@
-//! An image of which some rows are held, each from the beginning of a cache line.
+//! An image of which some rows are stored, each aligned to a cache line.
 
 use super::lanes::{Line, WIDEST};
 
-/// Lines of room after the last row: vectors may be read that begin on any pixel of it or right after.
+/// Cache lines after the last row: vectors may be loaded at any pixel of it or right after.
 const ROOM: usize = 2;
 
-/// A grey image, made row after row; of those made, the last [`Plane::held`] can be read. The numbers between the end of
-/// a row and the next have no meaning, but are finite.
+/// A grey image, computed row by row; of the computed rows, the last [`Plane::held`] can be read. Values between the end
+/// of a row and the next are meaningless, but finite.
 #[derive(Default)]
 pub(super) struct Plane {
     /// Columns, px.
     pub(super) width: usize,
     /// Rows, px.
     pub(super) height: usize,
-    /// Rows made.
+    /// Number of rows computed.
     pub(super) made: usize,
-    /// Numbers from one row to the next: an odd number of cache lines, so that pixels below each other do not all
-    /// compete for the same places of the cache.
+    /// Length of a row in memory: an odd number of cache lines, so that the pixels of a column do not all map to the
+    /// same cache sets.
     pub(super) stride: usize,
-    /// Rows held.
+    /// Number of rows stored.
     held: usize,
     lines: Vec<Line>,
 }
 
 impl Plane {
-    /// Makes it an image of this size without any rows yet, of which at most `held` will be held.
+    /// Resets to an image of this size without any rows, of which at most `held` will be stored.
     pub(super) fn begin(&mut self, [width, height]: [usize; 2], held: usize) {
         let row = width.div_ceil(WIDEST) | 1;
         let held = held.clamp(1, height.max(1));
@@ -32,31 +32,31 @@ impl Plane {
         (self.made, self.held) = (0, held);
         let lines = row * held + ROOM;
         if self.lines.len() < lines {
-            // Fresh zeros come without being written, where there is nothing to keep.
+            // `vec!` obtains zeroed memory without writing it.
             self.lines = vec![Line::ZERO; lines];
         }
     }
 
-    /// All numbers.
+    /// All values.
     #[inline(always)]
     pub(super) fn values(&self) -> &[f32] {
         bytemuck::cast_slice(&self.lines)
     }
 
-    /// Where a row begins among all numbers.
+    /// Index of the first value of a row.
     #[inline(always)]
     pub(super) fn start(&self, y: usize) -> usize {
         (y % self.held) * self.stride
     }
 
-    /// The numbers of a row and whatever follows.
+    /// The values of a row, followed by the rest of the buffer.
     #[inline(always)]
     pub(super) fn row(&self, y: usize) -> &[f32] {
         &self.values()[self.start(y)..]
     }
 
-    /// The rows from the first that is not made yet to the one before `end`, which are made with this: first rows and
-    /// the numbers of the rows from there on.
+    /// Marks the rows from the first not yet computed to the one before `end` as computed, and returns them to be
+    /// filled: index of the first row and values, in two parts because the buffer is circular.
     pub(super) fn make(&mut self, end: usize) -> [(usize, &mut [f32]); 2] {
         let (first, count) = (self.made, end.saturating_sub(self.made));
         self.made += count;

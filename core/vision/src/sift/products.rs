@@ -1,4 +1,4 @@
-//! The nearest descriptors of all by a product of matrices.
+//! Nearest neighbours of all descriptors by a product of matrices.
 //!
 //! ```text
 //! |q − t|² = |q|² + |t|² − 2 q·t
@@ -8,12 +8,12 @@
 //! | q, t | `query`, `train` | 0 … 255 each of 128 |
 //! | \|t\|² − 2 q·t | `less` | – |
 //!
-//! All these numbers are whole and below 2²⁴ = 16 777 216 (128 · 255² is 8 323 200), as are the sums on the way, so that
-//! single precision holds them exactly and the order of the sums does not matter.
+//! All these values are integers below 2²⁴ = 16 777 216 (128 · 255² is 8 323 200), as are the partial sums, so that
+//! single precision is exact and the order of summation does not matter.
 //!
-//! Train descriptors lie side by side in vectors, a block of them in the first cache. Their products with a few queries
-//! at a time stay in registers; from there each lane keeps the nearest and the second nearest of its own, and only at the
-//! end the lanes are compared.
+//! Train descriptors are side by side in vectors, a block of them in the L1 cache. Their products with a few queries at
+//! a time stay in registers; each lane keeps the nearest and the second nearest of its own, and the lanes are compared
+//! at the end.
 
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
@@ -21,15 +21,15 @@ use rayon::prelude::*;
 use super::lanes::{Line, WIDEST, load, places, store};
 use super::{Descriptor, Neighbours};
 
-/// Numbers of a descriptor.
+/// Elements of a descriptor.
 const NUMBERS: usize = 128;
-/// Queries whose sums are held in registers at a time.
+/// Queries whose sums are kept in registers at a time.
 const QUERIES: usize = 6;
-/// Lines of train descriptors in a block; they are the vectors of the widest processor.
+/// Lines of train descriptors in a block: vectors of the widest processor.
 const LINES: usize = 4;
 /// Descriptors of a block.
 const BLOCK: usize = LINES * WIDEST;
-/// Queries of a task of its own.
+/// Queries of a parallel task.
 const TASK: usize = 16 * QUERIES;
 
 /// The nearest neighbours in `train` of each of `query`.
@@ -44,11 +44,11 @@ fn square(descriptor: &Descriptor) -> f32 {
     descriptor.iter().map(|&number| u32::from(number).pow(2)).sum::<u32>() as f32
 }
 
-/// Train descriptors in blocks.
+/// Train descriptors, in blocks.
 struct Train {
-    /// For each block the first numbers of its descriptors, then the second ones …
+    /// For each block the first elements of its descriptors, then the second ones …
     numbers: Vec<Line>,
-    /// |t|², infinite where the last block has no descriptor.
+    /// |t|², infinite in the padding of the last block.
     squares: Vec<Line>,
 }
 
@@ -75,7 +75,7 @@ impl Train {
     }
 }
 
-/// What each lane has found for a query: |t|² − 2 q·t of the nearest and the second nearest, and which is the nearest.
+/// Best of each lane for a query: |t|² − 2 q·t of the nearest and the second nearest, and the index of the nearest.
 #[derive(Clone, Copy)]
 struct Found {
     nearest: [f32; WIDEST],
@@ -87,11 +87,11 @@ impl Found {
     const NOTHING: Self =
         Self { nearest: [f32::INFINITY; WIDEST], second: [f32::INFINITY; WIDEST], index: [0.0; WIDEST] };
 
-    /// The lanes compared.
+    /// Compares the lanes.
     fn neighbours(&self, query: &Descriptor) -> Option<Neighbours> {
         let lanes = || self.nearest.iter().zip(&self.index);
         let (&nearest, &index) = lanes().min_by(|a, b| a.0.total_cmp(b.0).then(a.1.total_cmp(b.1)))?;
-        // The second is a lane's second, or the nearest of another lane.
+        // The second is the second of a lane, or the nearest of another lane.
         let others = lanes().filter(|lane| *lane.1 != index || nearest == f32::INFINITY).map(|lane| *lane.0);
         let second = others.chain(self.second).fold(f32::INFINITY, f32::min);
         let square = square(query);
@@ -104,7 +104,7 @@ impl Found {
     }
 }
 
-/// The neighbours of some queries.
+/// Finds the neighbours of some queries.
 struct Task<'a> {
     queries: &'a [Descriptor],
     train: &'a Train,
@@ -117,7 +117,7 @@ impl WithSimd for Task<'_> {
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
         let Self { queries, train } = self;
         let groups = queries.len().div_ceil(QUERIES);
-        // Number after number of the queries of a group, as they are multiplied.
+        // The queries of a group, element by element, in the order of multiplication.
         let mut numbers = vec![0.0; groups * NUMBERS * QUERIES];
         for (i, query) in queries.iter().enumerate() {
             let group = &mut numbers[i / QUERIES * NUMBERS * QUERIES..];
@@ -144,7 +144,7 @@ impl WithSimd for Task<'_> {
     }
 }
 
-/// The products of a group of queries and a block, `V` vectors of it at a time.
+/// Computes the products of a group of queries and a block, `V` vectors of it at a time.
 struct Product<'a, const V: usize> {
     query: &'a [f32],
     train: &'a [f32],

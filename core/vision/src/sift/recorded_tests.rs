@@ -1,6 +1,7 @@
-//! Features of recorded images beside OpenCV's (`tests/reference/sift_reference.py` wrote the numbers and says how).
+//! Features of recorded images compared with OpenCV's; `tests/reference/sift_reference.py` wrote and describes the
+//! numbers.
 //!
-//! A test whose images are missing is left out (see `sightline_testdata`).
+//! A test is skipped if its images are missing (see `sightline_testdata`).
 
 use std::path::Path;
 
@@ -40,7 +41,7 @@ fn reference() -> Reference {
     serde_json::from_str(include_str!("../../../../tests/reference/sift_reference.json")).unwrap()
 }
 
-/// 8 bits of grey, as the other side has them: 0.299 R + 0.587 G + 0.114 B, rounded.
+/// Grey in 8 bits, converted as by the reference: 0.299 R + 0.587 G + 0.114 B, rounded.
 fn grey(path: &Path) -> image::GrayImage {
     if path.extension().is_some_and(|extension| extension == "pgm") {
         return portable_graymap(&std::fs::read(path).unwrap());
@@ -57,7 +58,7 @@ fn grey(path: &Path) -> image::GrayImage {
     }
 }
 
-/// A binary PGM file of 8 bits: four words, of which comments are no part, then the pixels.
+/// Decodes a binary PGM file of 8 bits: four words, with comments between, then the pixels.
 fn portable_graymap(bytes: &[u8]) -> image::GrayImage {
     let mut words = Vec::new();
     let mut at = 0;

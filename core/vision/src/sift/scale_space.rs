@@ -1,7 +1,7 @@
-//! The Gaussians of one octave after the other, of which a window of rows slides down.
+//! The Gaussians of one octave after the other, in a sliding window of rows.
 //!
 //! ```text
-//! G_0 of the first octave: the (doubled) image, blurred by sqrt(σ₀² − b²) from the blur b that it has
+//! G_0 of the first octave: the (doubled) image with blur b, blurred by sqrt(σ₀² − b²)
 //! G_l = G_(l−1) blurred by σ₀ k^(l−1) sqrt(k² − 1),    k = 2^(1/s),    l = 1 … s + 2
 //! G_0 of the next octave: every second pixel of G_s, whose blur is 2σ₀
 //! ```
@@ -9,13 +9,13 @@
 //! |---|---|---|
 //! | G_l | [`Octave::layers`] | fraction of full scale |
 //! | s, σ₀ | `scales_per_octave`, `sigma` of the settings | –, px of the octave |
-//! | b | `image_blur_px` of the settings, twice as much in the doubled image | px |
+//! | b | `image_blur_px` of the settings, doubled in the doubled image | px |
 //!
-//! The doubled image has the image's pixels at its even places and means of two or four of them between.
+//! The doubled image has the image's pixels at even positions and the means of two or four of them between.
 //!
-//! Of each layer only the rows are held that are still needed, so that all of them stay in the cache: an extremum in row
-//! y is looked for once the rows are there that its descriptor reaches, y + [`ScaleSpace::reach`], and rows above
-//! y − reach are gone by then. Only G_0 of the next octave is kept whole, a quarter of the image.
+//! Only the required rows of each layer are stored, so that all of them stay in the cache: row y is searched for extrema
+//! once the rows up to y + [`ScaleSpace::reach`], which its descriptors need, are computed; rows above y − reach are
+//! discarded. Only G_0 of the next octave is stored completely, a quarter of the image.
 
 use std::ops::Range;
 
@@ -26,17 +26,17 @@ use super::plane::Plane;
 use super::{SiftSettings, extent};
 use crate::image::GrayImage;
 
-/// Pixels along the edge of an octave in which no extremum is looked for.
+/// Width of the border of an octave that is not searched for extrema, px.
 pub(super) const BORDER: usize = 5;
-/// Least blur by which the first image is made smooth, px.
+/// Least blur applied to the first image, px.
 const LEAST_BLUR_PX: f64 = 0.1;
-/// More scales than this, or a larger σ₀, are no scale space.
+/// Upper bounds of the number of scales and of σ₀.
 const SCALES_MAX: u32 = 100;
 const SIGMA_MAX: f64 = 100.0;
-/// Rows by which the window moves on.
+/// Rows by which the window advances.
 const STEP: usize = 64;
 
-/// One octave.
+/// The Gaussians of one octave.
 pub(super) struct Octave {
     /// −1 for the doubled image, 0 for the input image's size, 1 for half of it …
     pub(super) exponent: i32,
@@ -51,42 +51,42 @@ impl Octave {
         self.layers.len() - 3
     }
 
-    /// Columns and rows.
+    /// Columns and rows, px.
     pub(super) fn size(&self) -> [usize; 2] {
         [self.layers[0].width, self.layers[0].height]
     }
 
-    /// Pixels of the input image from one pixel to the next.
+    /// Pixel pitch in pixels of the input image.
     pub(super) fn input_px(&self) -> f64 {
         2_f64.powi(self.exponent)
     }
 
-    /// The blur of layer `layer`, which may be a fraction, px of this octave.
+    /// Blur at a layer, which may be fractional, px of this octave.
     pub(super) fn sigma_at(&self, layer: f64) -> f64 {
         self.sigma * (layer / self.scales() as f64).exp2()
     }
 }
 
-/// The octaves of an image; one is held at a time.
+/// The octaves of an image; one is stored at a time.
 pub(super) struct ScaleSpace<'a> {
     image: &'a GrayImage,
-    /// The image or its double, which the first octave begins with.
+    /// The input of the first octave: the image or its double.
     source: Plane,
     first: Kernel,
-    /// From G_(l−1) to G_l.
+    /// Kernels from G_(l−1) to G_l.
     steps: Vec<Kernel>,
     octave: Octave,
     /// G_0 of the next octave.
     next: Plane,
-    /// Octaves begun.
+    /// Number of octaves begun.
     begun: usize,
-    /// Rows up to which the window has slid, and above which all extrema have been looked for.
+    /// Rows up to which the layers are requested, and rows already searched for extrema.
     front: usize,
     searched: usize,
 }
 
 impl<'a> ScaleSpace<'a> {
-    /// Nothing is computed yet; `None` for settings that describe no scale space.
+    /// Prepares the first octave without computing it; `None` for invalid settings.
     pub(super) fn new(image: &'a GrayImage, settings: &SiftSettings) -> Option<Self> {
         let SiftSettings { double_image, scales_per_octave: s, sigma, image_blur_px, .. } = *settings;
         let is_blur = |blur: f64| blur > 0.0 && blur <= SIGMA_MAX;
@@ -111,7 +111,7 @@ impl<'a> ScaleSpace<'a> {
         })
     }
 
-    /// Begins the next octave; false after the last that is large enough for an extremum.
+    /// Begins the next octave; returns false after the last that is large enough for an extremum.
     pub(super) fn next_octave(&mut self) -> bool {
         let held = self.rows_held();
         let mut size = [self.next.width, self.next.height];
@@ -132,7 +132,7 @@ impl<'a> ScaleSpace<'a> {
         size[0].min(size[1]) > 2 * BORDER
     }
 
-    /// Slides the window on: the octave and the rows in which extrema can be looked for now; `None` at its end.
+    /// Advances the window; returns the octave and the rows that can be searched, `None` at its end.
     pub(super) fn slide(&mut self) -> Option<(&Octave, Range<usize>)> {
         let [_, height] = self.octave.size();
         let (first, last) = (self.searched, height - BORDER);
@@ -145,25 +145,25 @@ impl<'a> ScaleSpace<'a> {
         (first < last).then_some((&self.octave, first..self.searched))
     }
 
-    /// The octave as far as it is made.
+    /// The octave as far as it is computed.
     #[cfg(test)]
     pub(super) fn octave(&self) -> &Octave {
         &self.octave
     }
 
-    /// Rows above and below an extremum's pixel that it may depend on.
+    /// Rows above and below an extremum's pixel on which its feature may depend.
     fn reach(&self) -> usize {
         let coarsest = self.octave.sigma_at(self.octave.scales() as f64 + 0.5);
         (f64::from(extent::REACH) * coarsest).ceil() as usize + extent::MOVE_MAX + 2
     }
 
-    /// Rows held of each layer: what an extremum reaches above and below, and how far the first layer is ahead.
+    /// Rows stored per layer: the reach above and below an extremum, plus the lead of the first layer.
     fn rows_held(&self) -> usize {
         let ahead: usize = self.steps.iter().map(Kernel::radius).sum();
         2 * self.reach() + ahead + self.first.radius() + STEP
     }
 
-    /// Makes the next rows of all layers.
+    /// Computes the next rows of all layers.
     fn advance(&mut self) {
         let [_, height] = self.octave.size();
         self.front = (self.front + STEP).min(height);
@@ -185,7 +185,7 @@ impl<'a> ScaleSpace<'a> {
     }
 }
 
-/// The image's rows up to `end`.
+/// Copies the image's rows up to `end`.
 fn copy(image: &GrayImage, plane: &mut Plane, end: usize) {
     let (width, stride) = (plane.width, plane.stride);
     for (first, rows) in plane.make(end) {
@@ -196,7 +196,7 @@ fn copy(image: &GrayImage, plane: &mut Plane, end: usize) {
     }
 }
 
-/// Every pixel, and the means half-way between; the last ones are repeated.
+/// Doubles the image: every pixel, and the means half-way between; the last ones are repeated.
 fn double(image: &GrayImage, plane: &mut Plane, end: usize) {
     let (width, height) = (image.width() as usize, image.height() as usize);
     let stride = plane.stride;
@@ -209,7 +209,7 @@ fn double(image: &GrayImage, plane: &mut Plane, end: usize) {
     }
 }
 
-/// The means of two rows, and between each two of them their mean.
+/// One row of the doubled image: means of two rows, and between neighbours their mean.
 fn double_row(above: &[f32], below: &[f32], doubled: &mut [f32]) {
     let last = above.len() - 1;
     let pairs = above.windows(2).zip(below.windows(2));
@@ -221,7 +221,7 @@ fn double_row(above: &[f32], below: &[f32], doubled: &mut [f32]) {
     doubled[2 * last..][..2].fill(value);
 }
 
-/// Every second pixel of every second row, as far as there are rows.
+/// Takes every second pixel of every second available row.
 fn halve(fine: &Plane, coarse: &mut Plane) {
     let (width, stride) = (coarse.width, coarse.stride);
     let end = fine.made.div_ceil(2).min(coarse.height);

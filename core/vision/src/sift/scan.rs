@@ -2,9 +2,9 @@
 //!
 //! ```text
 //! D_l = G_(l+1) − G_l,   l = 0 … s + 1        extrema of l = 1 … s:   ± D_l(x, y) > T   and
-//! ± D_l(x, y) > its 13 neighbours before it, ≥ the 13 after it, in the order of layer, row, column
+//! ± D_l(x, y) > its 13 preceding neighbours, ≥ the 13 following ones, in the order of layer, row, column
 //! ```
-//! Of several equal pixels side by side exactly one is found so. The differences of three rows at a time are held.
+//! Of several equal adjacent pixels exactly one is found. The differences of three rows at a time are stored.
 
 use std::ops::Range;
 
@@ -14,21 +14,21 @@ use rayon::prelude::*;
 use super::lanes::{Line, WIDEST, load, store};
 use super::scale_space::{BORDER, Octave};
 
-/// Rows of a task of its own.
+/// Rows of a parallel task.
 const BAND: usize = 32;
-/// Rows held.
+/// Number of rows stored.
 const HELD: usize = 3;
 
 /// A pixel of an octave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Candidate {
-    /// l.
+    /// l: layer of the difference of Gaussians.
     pub(super) layer: usize,
     pub(super) y: usize,
     pub(super) x: usize,
 }
 
-/// The extrema of some rows of all layers with |D| above `threshold`, in the order of layer, row and column.
+/// Finds the extrema in some rows of all layers with |D| above `threshold`, in the order of layer, row and column.
 pub(super) fn extrema(octave: &Octave, rows: Range<usize>, threshold: f32) -> Vec<Candidate> {
     let end = rows.end;
     let tops: Vec<usize> = rows.step_by(BAND).collect();
@@ -47,7 +47,7 @@ pub(super) fn extrema(octave: &Octave, rows: Range<usize>, threshold: f32) -> Ve
     found
 }
 
-/// The extrema of some rows.
+/// Finds the extrema in some rows.
 struct Band<'a> {
     octave: &'a Octave,
     threshold: f32,
@@ -79,7 +79,7 @@ impl WithSimd for Band<'_> {
                 next += 1;
             }
             for layer in 1..layers - 1 {
-                // Above, here and below, in the layer before, this one and the one after.
+                // Rows above, here and below, in the previous, this and the next layer.
                 let around = NEIGHBOURS.map(|[l, v]| {
                     let at = ((layer + l - 1) * HELD + (y + v - 1) % HELD) * line;
                     &lines[at..at + line]
@@ -91,10 +91,10 @@ impl WithSimd for Band<'_> {
     }
 }
 
-/// Layers and rows of the neighbours, plus one.
+/// Layer and row offsets of the neighbours, plus one.
 const NEIGHBOURS: [[usize; 2]; 9] = [[0, 0], [0, 1], [0, 2], [1, 0], [1, 1], [1, 2], [2, 0], [2, 1], [2, 2]];
 
-/// A row of D.
+/// Computes a row of D.
 struct Difference<'a> {
     finer: &'a [f32],
     coarser: &'a [f32],
@@ -114,7 +114,7 @@ impl WithSimd for Difference<'_> {
     }
 }
 
-/// The extrema of a row of a layer.
+/// Finds the extrema in a row of a layer.
 struct Row<'a> {
     around: [&'a [f32]; 9],
     threshold: f32,
@@ -124,7 +124,8 @@ struct Row<'a> {
     found: &'a mut Vec<Candidate>,
 }
 
-/// Leaves in the mask the lanes whose value is beyond its neighbours in rows of D, at the offsets from the column before.
+/// Clears the mask of lanes whose value is not beyond its neighbours in a row of D; offsets count from the column
+/// before.
 macro_rules! beyond {
     ($simd:ident, $mask:ident, [$sign:ident, $value:ident, $x:ident], $compare:ident, $row:expr, [$($offset:literal)*]) => {
         $(
@@ -134,14 +135,14 @@ macro_rules! beyond {
     };
 }
 
-/// The same for neighbours that come before the pixel.
+/// As `beyond!`, for neighbours that precede the pixel.
 macro_rules! beyond_before {
     ($simd:ident, $mask:ident, $at:tt, $row:expr, $offsets:tt) => {
         beyond!($simd, $mask, $at, greater_than_f32s, $row, $offsets)
     };
 }
 
-/// The same for neighbours that come after it.
+/// As `beyond!`, for neighbours that follow the pixel.
 macro_rules! beyond_after {
     ($simd:ident, $mask:ident, $at:tt, $row:expr, $offsets:tt) => {
         beyond!($simd, $mask, $at, greater_than_or_equal_f32s, $row, $offsets)

@@ -1,4 +1,4 @@
-//! Features of images whose truth is known.
+//! Features of images with known ground truth.
 
 use std::f64::consts::{PI, TAU};
 
@@ -6,7 +6,7 @@ use image::Luma;
 
 use super::*;
 
-/// A Gaussian blob: (x, y), its standard deviation and its height, on grey ground.
+/// A Gaussian blob on grey: (x, y), standard deviation and height.
 #[derive(Clone, Copy)]
 struct Blob {
     x: f64,
@@ -58,15 +58,15 @@ fn a_gaussian_blob_gives_a_keypoint_at_its_place_and_of_its_scale() {
         let blob = Blob { x, y, sigma, height };
         let features = detect(&image_of(81, &[blob]), &SiftSettings::default());
         assert!(!features.keypoints.is_empty(), "σ = {sigma}");
-        // A blob of σ_b answers most where k s² = σ_b² + b², with b the blur taken to be in it already: the difference of
-        // s and k s is greatest there.
+        // The response to a blob of σ_b is largest at k s² = σ_b² + b², with b the blur assumed in the image: there the
+        // difference of scales s and k s is greatest.
         let k = 2_f64.powf(1.0 / 3.0);
         let expected = ((sigma * sigma - 0.25) / k).sqrt();
         let strongest =
             features.keypoints.iter().max_by(|a, b| a.contrast.abs().total_cmp(&b.contrast.abs())).unwrap();
         assert_eq!(strongest.contrast > 0.0, height < 0.0);
         let (dx, dy) = (f64::from(strongest.x) - x, f64::from(strongest.y) - y);
-        // The parabola through three pixels errs by a share of the octave's pixel.
+        // The error of the parabola through three pixels is a fraction of the octave's pixel.
         let pixel = 2_f64.powi(i32::from(strongest.octave)).max(1.0);
         assert!(dx.hypot(dy) < 0.05 * pixel, "σ = {sigma}: off by ({dx}, {dy})");
         let ratio = f64::from(strongest.sigma_px) / expected;
@@ -78,9 +78,9 @@ fn a_gaussian_blob_gives_a_keypoint_at_its_place_and_of_its_scale() {
 fn turning_the_image_by_a_quarter_turns_the_keypoints_and_keeps_the_descriptors() {
     let side = 161;
     let image = texture(side);
-    // (x, y) of the image comes to (side − 1 − y, x): +x becomes +y.
+    // (x, y) of the image maps to (side − 1 − y, x): +x becomes +y.
     let turned = image::imageops::rotate90(&image);
-    // Sides are odd and the doubled image is sampled at their pixels: without it the two differ by nothing but rounding.
+    // Odd sides, and no doubled image, whose samples are not symmetric: the two then differ by rounding only.
     let settings = SiftSettings { double_image: false, ..SiftSettings::default() };
     let (before, after) = (detect(&image, &settings), detect(&turned, &settings));
     assert!(before.keypoints.len() > 60, "{}", before.keypoints.len());
@@ -97,7 +97,7 @@ fn turning_the_image_by_a_quarter_turns_the_keypoints_and_keeps_the_descriptors(
         assert!(descriptor_distance(descriptor, other) < 12.0, "{keypoint:?}");
         found += 1;
     }
-    // Octaves of even sides lose a row at one end and not at the other.
+    // Octaves with even sides lose a row at one end only.
     assert!(100 * found > 80 * before.keypoints.len(), "{found} of {}", before.keypoints.len());
 }
 
@@ -127,7 +127,7 @@ fn no_feature_depends_on_an_invalid_pixel() {
     for (keypoint, descriptor) in holed.keypoints.iter().zip(&holed.descriptors) {
         let reach = 10.6 * keypoint.sigma_px;
         assert!(keypoint.x - 29.0 > reach && (keypoint.x - 150.0).hypot(keypoint.y - 60.0) > reach);
-        // The same as without the hole, but for what is beyond 3σ of the blur.
+        // Equal to the feature without the hole, except for contributions beyond 3σ of the blur.
         let closest = whole
             .keypoints
             .iter()

@@ -1,28 +1,28 @@
-//! Keeps features away from invalid pixels.
+//! Rejects features near invalid pixels.
 //!
-//! The scale space needs a value everywhere: an invalid pixel takes that of the nearest valid one in its row, a row
-//! without any that of the next row that has one. No feature may depend on such a value, so a keypoint is given up when
-//! an invalid pixel lies within its *reach*: the half diagonal of the descriptor's window, 2.5 · 3σ · √2, and 3σ
-//! beyond for the blur.
+//! The scale space needs a value everywhere: an invalid pixel takes the value of the nearest valid one in its row; a row
+//! without any is a copy of the last row above that has one, or of the first such row below. No feature may depend on
+//! such a value, so a keypoint is rejected if an invalid pixel is within its *reach*: half the diagonal of the
+//! descriptor's window, 2.5 · 3σ · √2, plus 3σ for the blur.
 
 use std::borrow::Cow;
 
 use super::{Keypoint, extent};
 use crate::image::GrayImage;
 
-/// How far the blur carries a pixel's value, in σ.
+/// Reach of the blur, in σ.
 const BLUR_REACH: f32 = 3.0;
 
-/// Where the invalid pixels are.
+/// Positions of the invalid pixels.
 pub(super) struct Validity {
     width: usize,
     height: usize,
-    /// Invalid pixels left of each pixel in its row, one more than pixels in a row; empty where all are valid.
+    /// Number of invalid pixels left of each pixel in its row, with one more entry than pixels; empty if all are valid.
     before: Vec<u32>,
 }
 
 impl Validity {
-    /// What is valid of an image; `None` where nothing is.
+    /// Finds the invalid pixels of an image; `None` if all are.
     pub(super) fn of(image: &GrayImage) -> Option<Self> {
         let (width, height) = (image.width() as usize, image.height() as usize);
         let invalid = image.as_raw().iter().filter(|v| !v.is_finite()).count();
@@ -44,7 +44,7 @@ impl Validity {
         Some(Self { width, height, before })
     }
 
-    /// The image with a value everywhere.
+    /// Returns the image with a value at every pixel.
     pub(super) fn mended<'a>(&self, image: &'a GrayImage) -> Cow<'a, GrayImage> {
         if self.before.is_empty() {
             return Cow::Borrowed(image);
@@ -55,7 +55,7 @@ impl Validity {
         for (row, is_empty) in values.chunks_exact_mut(self.width).zip(&mut is_empty) {
             *is_empty = !mend_row(row);
         }
-        // Down from each row that has values, then up from the first.
+        // Downwards from each row that has values, then upwards from the first.
         for y in 1..self.height {
             if is_empty[y] && !is_empty[y - 1] {
                 values.copy_within((y - 1) * self.width..y * self.width, y * self.width);
@@ -69,7 +69,7 @@ impl Validity {
         Cow::Owned(mended)
     }
 
-    /// Whether all pixels within the keypoint's reach are valid.
+    /// Returns whether all pixels within the keypoint's reach are valid.
     pub(super) fn allows(&self, keypoint: &Keypoint) -> bool {
         if self.before.is_empty() {
             return true;
@@ -85,13 +85,13 @@ impl Validity {
     }
 }
 
-/// The whole numbers from `low` to `high` that are pixels of a side.
+/// The integers from `low` to `high` that are pixels of a side.
 fn clipped(low: f32, high: f32, side: usize) -> std::ops::Range<usize> {
     let end = (high.floor() + 1.0).clamp(0.0, side as f32) as usize;
     (low.ceil().max(0.0) as usize).min(end)..end
 }
 
-/// Gives each invalid pixel the value of the nearest valid one; whether there is one.
+/// Gives each invalid pixel the value of the nearest valid one; returns false if there is none.
 fn mend_row(row: &mut [f32]) -> bool {
     let valid: Vec<usize> = (0..row.len()).filter(|&x| row[x].is_finite()).collect();
     let (Some(&first), Some(&last)) = (valid.first(), valid.last()) else { return false };

@@ -1,36 +1,38 @@
-//! Epipolar alignment: two linear cameras in whose images a point lies in the same row of both.
+//! Epipolar alignment: two linear cameras in whose images a point has the same row.
 //!
 //! ```text
-//! x̂ = unit(C2 − C1), along H1'     ŷ = unit of the part of V1' + V2' across x̂     n̂ = x̂ × ŷ, along A1
+//! x̂ = unit(C2 − C1), along H1'     ŷ = unit of the part of V1' + V2' orthogonal to x̂     n̂ = x̂ × ŷ, along A1
 //! t = ± (axis · u)/(n̂ · u) of the rays u at the corners and the middle of each side, at most tan(field_max)
-//! t_L, t_R, t_T, t_B: the least of both cameras and three rays of a side            what both see
-//! hs = (W − 1)/(t_R + t_L)   hc = hs t_L   H = hs x̂ + hc n̂   A = n̂                  V alike from ŷ
+//! t_L, t_R, t_T, t_B: the least of both cameras and three rays of a side            the common field of view
+//! hs = (W − 1)/(t_R + t_L)   hc = hs t_L   H = hs x̂ + hc n̂   A = n̂                  V likewise from ŷ
 //! depth along A = hs B/(x_L − x_R)                                                  B = |C2 − C1|
 //! ```
 //! | symbol | our name | unit, frame |
 //! |---|---|---|
-//! | C, A, H, V | [`Alignment::left`], [`Alignment::right`] | m, –, px, px; that of the cameras |
+//! | C, A, H, V | [`Alignment::left`], [`Alignment::right`] | m, –, px, px; frame of the cameras |
 //! | W, H | [`AlignSettings::size`], without it the left camera's | px |
 //! | field_max | [`AlignSettings::field_max_deg`] | deg |
 //! | B | [`Alignment::baseline_m`] | m |
 //!
-//! **About a plane** m·P = h (the ground). Its disparity is linear in the pixel; the right camera is sheared so that it is the same,
-//! d₀, in every pixel. A window then covers ground of one disparity, while on unsheared images it changes by a pixel and more
-//! from the upper to the lower rows of a window, and the answer depends on where the texture is.
+//! **About a plane** m·P = h (the ground). Its disparity is linear in the pixel; the right camera is sheared so that it
+//! is d₀ in every pixel. A window then covers ground of a single disparity. On unsheared images the disparity changes by
+//! a pixel and more from the upper to the lower rows of a window, and the result depends on where in the window the
+//! texture is.
 //!
 //! ```text
 //! d(x, y) = a x + b y + c      of the plane:  hs B/(h − m·C1) · m·u,   u: the ray of (x, y) with n̂·u = 1
-//! H_R = (H + b V + c A)/(1 − a) − d₀ A      d₀: half the largest d: ground twice as far below the camera has a disparity, too
+//! H_R = (H + b V + c A)/(1 − a) − d₀ A      d₀: half the largest d, so that ground twice as far below the camera has d ≥ 0
 //! ```
 //!
-//! **Resampling.** A pixel of an aligned image shows what the real camera sees along its ray. Where that is in the real image
-//! is computed exactly at every eighth pixel and by cubics in between (Lagrange), which errs by less than 1e-4 px for
-//! lenses such as the hazcams'. Rays of a CAHVORE model do not start at C: its pixels are those of points at
-//! [`AlignSettings::range_m`]. What lies nearer or farther is off its row by little (the pupil moves by 6 mm at the edge);
-//! ranges are not touched by that, since they come from the pixels of the real images and the true cameras (`ranges`).
+//! **Resampling.** A pixel of an aligned image takes the value that the real camera sees along its ray. Its position in
+//! the real image is computed exactly at every eighth pixel and interpolated by cubics (Lagrange), with an error below
+//! 1e-4 px for lenses such as the hazcams'. Rays of a CAHVORE model do not start at C: its pixels are those of points at
+//! [`AlignSettings::range_m`]. Nearer or farther points are off their row by little (the pupil moves by 6 mm at the
+//! edge). Ranges are not affected, since they are computed from the pixels of the real images and the true cameras
+//! (`ranges`).
 //!
-//! Sources: domain.md 3.3, the five steps of JPL's `cmod_cahvor_warp_models`, which limits the field to 75°. Departure: hazcams are
-//! aligned like any other pair, within a field that can be set.
+//! Sources: domain.md 3.3, the five steps of JPL's `cmod_cahvor_warp_models`, which limits the field to 75°. Departure:
+//! hazcams are aligned like any other pair, within a configurable field.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -43,20 +45,20 @@ use sightline_geometry::camera::{Cahv, Camera, CameraModel};
 use sightline_geometry::error::{Error, Result};
 use sightline_geometry::frames::{Pixel, Point3, Vector3};
 
-/// Pixels between two exact places of a warp.
+/// Spacing of the exact nodes of a warp, px.
 const STEP: usize = 8;
-/// Where the pixels of a camera with one centre are looked at, m: anywhere.
+/// Range at which rays of a camera with one centre are projected, m; any value gives the same pixel.
 const REMOTE_M: f64 = 1e4;
 
-/// How a pair is aligned.
+/// Settings of the epipolar alignment.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct AlignSettings {
-    /// Width and height of the aligned images, px (those of the left camera).
+    /// Width and height of the aligned images, px; by default those of the left camera.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size: Option<[u32; 2]>,
-    /// Largest angle from the aligned axis at which a side may lie, degrees, 5 to 80 (60: domain.md 3.3). Wider: fewer
-    /// pixels for the middle of a fisheye; narrower: what lies at its sides is left out.
+    /// Largest angle between the aligned axis and a side of the image, degrees, 5 to 80 (60: domain.md 3.3). Wider:
+    /// fewer pixels for the middle of a fisheye; narrower: its sides are cut off.
     pub field_max_deg: f64,
     /// Range at which the rows of a fisheye pair agree exactly, m, 0.1 to 1000 (2: ours, an arm's work space and more).
     pub range_m: f64,
@@ -71,20 +73,20 @@ impl Default for AlignSettings {
 /// A plane: the points P with `normal`·P = `distance_m`, in the frame of the cameras.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
-    /// Unit vector across it.
+    /// Unit normal.
     pub normal: Vector3,
-    /// Its distance from the origin along the normal, m.
+    /// Distance from the origin along the normal, m.
     pub distance_m: f64,
 }
 
-/// Two aligned cameras, and where their pixels lie in the images of the real ones.
+/// Two aligned cameras, and the positions of their pixels in the images of the real ones.
 #[derive(Clone, Debug)]
 pub struct Alignment {
     /// The aligned left camera, in the frame of the real ones.
     pub left: Camera,
-    /// The aligned right camera: as the left one, but for its centre, and sheared about a plane.
+    /// The aligned right camera: equal to the left one except for its centre, and sheared about a plane.
     pub right: Camera,
-    /// The disparity of that plane, px; 0 without one.
+    /// Disparity of that plane, px; 0 without one.
     pub plane_px: f64,
     warps: [Warp; 2],
 }
@@ -93,7 +95,8 @@ impl Alignment {
     /// Aligns two cameras whose models are in one frame.
     ///
     /// # Errors
-    /// [`Error::Request`] when they stand in one place, look along the line between them, or see nothing in common.
+    /// [`Error::Request`] if their centres coincide, they point along the baseline, or their fields of view do not
+    /// overlap.
     pub fn new(left: &Camera, right: &Camera, settings: &AlignSettings) -> Result<Self> {
         Self::about(left, right, None, settings)
     }
@@ -101,7 +104,7 @@ impl Alignment {
     /// Aligns two cameras so that all points of a plane have one disparity.
     ///
     /// # Errors
-    /// As [`Self::new`], and for a plane that does not lie in front of the left camera.
+    /// As [`Self::new`], and for a plane that is not in front of the left camera.
     pub fn about(
         left: &Camera,
         right: &Camera,
@@ -156,30 +159,30 @@ impl Alignment {
         (self.right.model.centre() - self.left.model.centre()).norm()
     }
 
-    /// The disparity of a depth along A (m), px, without a plane.
+    /// Disparity at a depth along A (m), px; without the shear of a plane.
     pub fn disparity_px(&self, depth_m: f64) -> f64 {
         self.left.model.image_plane().hs * self.baseline_m() / depth_m
     }
 
-    /// Both images as the aligned cameras see them; NaN where the real ones see nothing.
+    /// Resamples both images to the aligned cameras; NaN outside the real images.
     pub fn images(&self, left: &GrayImage, right: &GrayImage) -> [GrayImage; 2] {
         let (left, right) = rayon::join(|| self.warps[0].image(left), || self.warps[1].image(right));
         [left, right]
     }
 
-    /// Where a row of the aligned left image lies in the real one.
+    /// Positions of a row of the aligned left image in the real one.
     pub fn left_row(&self, y: f64) -> WarpRow {
         self.warps[0].row(y)
     }
 
-    /// Where a row of the aligned right image lies in the real one.
+    /// Positions of a row of the aligned right image in the real one.
     pub fn right_row(&self, y: f64) -> WarpRow {
         self.warps[1].row(y)
     }
 }
 
-/// H of the right camera in whose image all points of a plane have one disparity, and that disparity, px; `None` for a plane that
-/// no pixel sees, or one seen from its edge.
+/// H of the right camera in whose image all points of a plane have one disparity, and that disparity, px; `None` if the
+/// plane is not in front of the left camera or is seen edge-on.
 fn shear(left: &Camera, right_centre: Point3, plane: &Plane) -> Option<(Vector3, f64)> {
     let (linear, image) = (left.model.linear(), left.model.image_plane());
     let centre = left.model.centre();
@@ -224,11 +227,11 @@ impl Axes {
         let down = vertical(left) + vertical(right);
         let y = (down - x * x.dot(&down)).try_normalize(1e-3)?;
         let n = along(x.cross(&y), left.model.axis());
-        // An axis along the baseline sees no depth.
+        // A camera that points along the baseline measures no depth.
         (n.dot(&left.model.axis()) > 0.2).then_some(Self { x, y, n })
     }
 
-    /// How far both cameras see towards `side`, as a tangent; `None` where a ray is missing.
+    /// Tangent of the angle to which both cameras see towards `side`, at most `at_most`; `None` if a ray is missing.
     fn extent(&self, cameras: &[&Camera; 2], side: &Vector3, at_most: f64) -> Option<f64> {
         let mut least = at_most;
         for camera in cameras {
@@ -256,12 +259,12 @@ impl Axes {
     }
 }
 
-/// Where the pixels of an aligned image lie in the real one: exactly at every eighth, NaN where they do not.
+/// Positions of the pixels of an aligned image in the real one: exact at every eighth pixel, NaN outside.
 #[derive(Clone, Debug)]
 struct Warp {
     size: [usize; 2],
     columns: usize,
-    /// Row by row; the first one is `STEP` before pixel (0, 0).
+    /// Row by row; the first node is `STEP` before pixel (0, 0) in both directions.
     nodes: Vec<[f64; 2]>,
 }
 
@@ -279,7 +282,7 @@ impl Warp {
         Self { size, columns, nodes: (0..columns * rows).into_par_iter().map(node).collect() }
     }
 
-    /// The places of row `y`, from 0 to the height less 1.
+    /// Positions of row `y`, from 0 to the height less 1.
     fn row(&self, y: f64) -> WarpRow {
         let (first, weights) = taps(y);
         let rows = &self.nodes[first * self.columns..][..4 * self.columns];
@@ -307,14 +310,14 @@ impl Warp {
     }
 }
 
-/// The places of a row of an aligned image in the real one.
+/// Positions of a row of an aligned image in the real one.
 #[derive(Clone, Debug)]
 pub struct WarpRow {
     nodes: Vec<[f64; 2]>,
 }
 
 impl WarpRow {
-    /// The place of column `x`, from 0 to the width less 1, px; NaN where the real image has none.
+    /// Position of column `x`, from 0 to the width less 1, px; NaN outside the real image.
     #[inline]
     pub fn at(&self, x: f64) -> Pixel {
         let (first, weights) = taps(x);
@@ -329,7 +332,7 @@ impl WarpRow {
     }
 }
 
-/// The first of four nodes around a place, and their weights (Lagrange).
+/// The first of four nodes around a position, and their weights (Lagrange).
 #[inline(always)]
 fn taps(place: f64) -> (usize, [f64; 4]) {
     let cell = (place / STEP as f64).max(0.0) as usize;

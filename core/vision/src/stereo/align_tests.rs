@@ -1,5 +1,5 @@
-//! Alignment against projection, and against the figures of the rules for a real pair (domain.md 15, TV6),
-//! which come from JPL's code: it does not make A unit, so that they agree to 5e-6 rad and 0.01 px (domain.md 3.3).
+//! Alignment against projection, and against reference numbers for a real pair (domain.md 15, TV6) from JPL's code. That
+//! code does not normalise A, so that they agree to 5e-6 rad and 0.01 px (domain.md 3.3).
 
 use super::*;
 use sightline_geometry::camera::{Cahvor, Cahvore, Imaging, Mast, MastAngles};
@@ -25,7 +25,7 @@ fn hazcams() -> (Camera, Camera) {
     (at(0.609331, -0.041064, -0.233849), at(0.6098595, 0.0589344, -0.2336460))
 }
 
-/// Points that both aligned cameras see, at many ranges.
+/// Points in the field of view of both aligned cameras, at many ranges.
 fn points(alignment: &Alignment) -> Vec<(Pixel, Point3)> {
     let mut points = Vec::new();
     for k in 0..400 {
@@ -172,7 +172,7 @@ fn a_pair_with_its_baseline_askew_shows_every_point_in_the_same_row() {
             continue;
         }
         assert!((in_left.y - in_right.y).abs() < 1e-9, "{in_left:?} {in_right:?}");
-        // What the aligned images show in these pixels the real cameras see where the point is.
+        // The positions in the real images are the projections of the point by the real cameras.
         for (aligned, real, row) in [
             (in_left, &left, alignment.left_row(in_left.y)),
             (in_right, &right, alignment.right_row(in_right.y)),
@@ -219,7 +219,7 @@ fn about_a_plane_all_of_its_points_have_one_disparity() {
         let above = alignment.left.ray(pixel).unwrap().at(0.7 * along_m);
         let in_right = alignment.right.project(&above).unwrap();
         assert!((in_right.y - pixel.y).abs() < 1e-9 && pixel.x - in_right.x > alignment.plane_px + 0.5);
-        // The aligned right image shows there what the real camera sees.
+        // The position in the real right image is the projection of the point by the real camera.
         if (0.0..=1023.0).contains(&in_right.x) {
             let (taken, seen) =
                 (alignment.right_row(in_right.y).at(in_right.x), right.project(&above).unwrap());

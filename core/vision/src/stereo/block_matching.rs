@@ -1,4 +1,4 @@
-//! Block matching: a disparity is as good as the bits of a square window agree.
+//! Block matching: the cost of a disparity is the number of differing census bits in a square window.
 //!
 //! ```text
 //! V(x, d) = Σ_{|v| ≤ r} C(x, y + v; d)        S(x, d) = Σ_{|u| ≤ r} V(x + u, d)
@@ -10,20 +10,21 @@
 //! | S | `sums` | bits, at most 24 · 31² |
 //! | r | half of `StereoSettings::window_px` | px |
 //!
-//! V goes from row to row by one row more and one less, S from pixel to pixel by one column more and one less; the
-//! costs of as many rows as the window has are held for that. All of it is one sweep along the row: the costs of the
-//! column that enters the window, its V, S, and the winner of the pixel in the middle. At the border the window is cut: every
-//! disparity of a pixel is summed over the same cells. Departure from JPL's correlator (domain.md 7): bits of a census instead of grey
-//! values behind a band pass, since single pixels then count alike, whether they lie on an edge or not.
+//! V is updated from row to row by adding one row and subtracting one, S from pixel to pixel likewise by columns; the
+//! costs of as many rows as the window has are stored for that. All of it is one sweep along the row: the costs of the
+//! column that enters the window, its V, S, and the winner of the pixel in the middle. At the border the window is
+//! clipped: all disparities of a pixel are summed over the same cells. Departure from JPL's correlator (domain.md 7):
+//! census bits instead of band-passed grey values, since all pixels then have the same weight, on an edge or not.
 //!
-//! Rows are matched in bands of fixed height, each by itself: what it costs is the window's height once more, and the bits
-//! do not depend on the number of threads.
+//! Rows are matched in independent bands of fixed height. Each band costs one window height more, and the bits do not
+//! depend on the number of threads.
 //!
-//! **The bound.** In vectors of 512 bits, for 64 cells: 23 operations for their bits, 9 for V, 4 for S, 6 for the right image's
-//! winners and 10 for the left one's, 0.8 a pixel and disparity, and 20 a pixel for its least sum and that one's place. 1024 × 1024
-//! pixels with 128 disparities are 2.1 M times 64 cells: 34 M cycles of four operations, 8 ms at 4.1 GHz; 9 stores for 64 cells are
-//! 5 ms beside it. A row reads and writes 128 kB of C, of which a window of 11 rows holds 1.4 MB, more than the second cache, and
-//! 256 kB of V: 0.7 GB in all. Measured times: `docs/benchmarks.md`.
+//! **Lower bound of the time.** In vectors of 512 bits, for 64 cells: 23 operations for their bits, 9 for V, 4 for S, 6
+//! for the right image's winners and 10 for the left one's, 0.8 per pixel and disparity, and 20 per pixel for its least
+//! sum and the index of it. 1024 × 1024 pixels with 128 disparities are 2.1 M times 64 cells: 34 M cycles of four
+//! operations, 8 ms at 4.1 GHz; 9 stores for 64 cells take 5 ms in parallel. A row reads and writes 128 kB of C, of
+//! which a window of 11 rows takes 1.4 MB, more than the L2 cache, and 256 kB of V: 0.7 GB in all. Measured times:
+//! `docs/benchmarks.md`.
 
 use std::ops::Range;
 
@@ -38,14 +39,14 @@ use super::winner::{RightWinners, winner};
 /// Rows of a band.
 pub(super) const BAND: usize = 128;
 
-/// Pixels whose winners are found together: what each of them waits for, the processor does for all at once.
+/// Pixels whose winners are found together, so that the processor overlaps the latencies of their dependency chains.
 const GROUP: usize = 16;
 
-/// Room for what is held of a band.
+/// Buffers of a band.
 pub(super) struct Band {
     left: Planes<SPARSE>,
     right: Planes<SPARSE>,
-    /// Of as many rows as the window has; row y lies at y modulo that.
+    /// C of as many rows as the window has; row y is at index y modulo their number.
     costs: Vec<Row<u8>>,
     columns: Row<u16>,
     right_winners: RightWinners,
@@ -66,7 +67,7 @@ impl Band {
     }
 }
 
-/// The results of some rows, given to `take` from top to bottom.
+/// Matches a range of rows and passes each result to `take`, from top to bottom.
 pub(super) fn match_rows<const N: usize>(
     scene: &Scene<'_>,
     band: &mut Band,
@@ -87,7 +88,7 @@ pub(super) fn match_rows<const N: usize>(
             band.right.take(&scene.right, next);
         }
         let gives = next >= rows.start + half;
-        // The row that comes in takes the place of the one that goes out.
+        // The entering row replaces the leaving one.
         Arch::new().dispatch(Sweep::<N> { scene, band, next, comes, goes: next >= first + window, gives });
         if gives {
             take(next - half, &band.result);
@@ -95,16 +96,16 @@ pub(super) fn match_rows<const N: usize>(
     }
 }
 
-/// One row more and one less, and the windows of the row in the middle.
+/// Adds the entering row, removes the leaving one, and evaluates the windows of the middle row.
 struct Sweep<'a, const N: usize> {
     scene: &'a Scene<'a>,
     band: &'a mut Band,
     next: usize,
-    /// Whether the image has the row that comes in.
+    /// Whether the entering row is inside the image.
     comes: bool,
-    /// Whether one goes out.
+    /// Whether a row leaves the window.
     goes: bool,
-    /// Whether the window is whole.
+    /// Whether the window of the middle row is complete.
     gives: bool,
 }
 
@@ -168,27 +169,27 @@ fn cells_mut<const N: usize, T: bytemuck::Pod>(row: &mut Row<T>) -> &mut [[Block
     row.values_mut().as_chunks_mut().0.as_chunks_mut().0
 }
 
-/// The bits of a row.
+/// Census bits of a row.
 struct Bits<'a> {
     left: [&'a [u8]; SPARSE],
     right: [&'a [u8]; SPARSE],
     is_none: &'a [u8],
 }
 
-/// V of a row, and what it is made of.
+/// V of a row, and its inputs.
 struct Columns<'a, const N: usize> {
-    /// Of the row that comes in.
+    /// Bits of the entering row; `None` below the image.
     bits: Option<Bits<'a>>,
     first: usize,
-    /// C of the row that goes out, and then of the one that comes in.
+    /// C of the leaving row, overwritten by C of the entering one.
     costs: &'a mut [[Block<u8>; N]],
     sums: &'a mut [[Block<u16>; N]],
-    /// 255 where a row goes out.
+    /// 255 if a row leaves, else 0.
     kept: u8,
 }
 
 impl<const N: usize> Columns<'_, N> {
-    /// Takes the new costs of column `at`, and adds it to the sums.
+    /// Computes the new costs of column `at`, updates its V, and adds that to the sums.
     #[inline(always)]
     fn enter(&mut self, at: usize, sums: &mut [Block<u16>; N]) {
         let (old, mut new) = (self.costs[at], [[0; LANES]; N]);
@@ -209,7 +210,7 @@ impl<const N: usize> Columns<'_, N> {
         }
     }
 
-    /// Takes column `at` off the sums.
+    /// Subtracts column `at` from the sums.
     #[inline(always)]
     fn leave(&self, at: usize, sums: &mut [Block<u16>; N]) {
         let column = &self.sums[at];

@@ -1,4 +1,4 @@
-//! What a pixel's surroundings look like, in bits that brightness and contrast do not change.
+//! Census transform: the surroundings of a pixel in bits that are invariant to brightness and contrast.
 //!
 //! ```text
 //! census:  bit k of pixel p = [ I(p + o_k) > I(p) ]                                          (Zabih & Woodfill 1994)
@@ -7,22 +7,21 @@
 //! | for | o_k | planes | C |
 //! |---|---|---|---|
 //! | semi-global matching | the other pixels of 9 × 7 | [`WHOLE`] | 0 … 62 |
-//! | block matching | of these every second column of the middle row and of the rows 1 and 3 beside it | [`SPARSE`] | 0 … 24 |
+//! | block matching | of these, even columns of the middle row and of the rows ±1 and ±3 | [`SPARSE`] | 0 … 24 |
 //!
-//! A window sums the bits of its pixels, and what one of them leaves out its neighbours look at: a part of the pixels is
-//! enough there (ours; docs/stereo.md has the figures).
+//! A window sums the bits of its pixels, and the neighbours of a pixel cover the positions that its own bits leave out:
+//! a part of the pixels is enough there (ours; docs/stereo.md has the figures).
 //!
-//! The bits of a row lie in planes of bytes, so that sixty-four disparities are compared side by side: the right
-//! image is mirrored, and the partners of p for d, d + 1, d + 2 … follow each other. The differences of a cell are first
-//! added as a carry-save adder adds them, which leaves four counts of bits instead of eight, and two instead of three. Bits are
-//! made row by row when they are asked for, which is quicker than to hold them.
+//! The bits of a row are stored in planes of bytes, so that 64 disparities are compared side by side: the right image is
+//! mirrored, and the partners of p for d, d + 1, d + 2 … are adjacent. The differences of a cell are first summed by
+//! carry-save adders, which leaves four bit counts instead of eight, and two instead of three. Bits are computed row by
+//! row on demand, which is faster than storing them.
 //!
-//! A cell whose partner lies outside of the right image or is invalid costs less than the half of the bits by which
-//! two pixels that have nothing to do with each other differ, so that a surface goes on beyond the border; a pixel that finds it
-//! the cheapest has no answer.
+//! A cell whose partner is outside the right image or invalid costs less than half of the bits by which two unrelated
+//! pixels differ, so that a surface continues beyond the border; a pixel whose best cell is such a one has no disparity.
 //!
-//! Beside the border a missing pixel is the nearest one of its row or column; an invalid one is the last valid one of its
-//! row.
+//! Pixels beyond the border have the value of the nearest one of their row or column; an invalid pixel has the value of
+//! the last valid one of its row.
 //!
 //! | symbol | our name | unit |
 //! |---|---|---|
@@ -35,28 +34,28 @@ use rayon::prelude::*;
 use super::lanes::{Block, LANES, Row, blocks, blocks_mut};
 use crate::image::GrayImage;
 
-/// Planes of 62 bits.
+/// Number of planes of the 62 bits.
 pub(super) const WHOLE: usize = 8;
-/// Planes of 24 bits.
+/// Number of planes of the 24 bits.
 pub(super) const SPARSE: usize = 3;
-/// What a cell costs whose partner is none, of 62 bits and of 24.
+/// Cost of a cell without a valid partner, of 62 bits and of 24.
 const COST_NONE: [u8; 2] = [24, 9];
-/// How far the widest census reaches to the sides and up and down, px.
+/// Half width and half height of the full census window, px.
 const REACH: [usize; 2] = [4, 3];
 
-/// An image of 16 bits with a margin at the sides.
+/// An image in 16 bits with a margin at the sides.
 pub(super) struct Sixteen {
     is_mirrored: bool,
     width: usize,
     height: usize,
     stride: usize,
     values: Vec<u16>,
-    /// 255 where the image is invalid, without margin.
+    /// 255 for invalid pixels; without margin.
     is_none: Vec<u8>,
 }
 
 impl Sixteen {
-    /// An image, mirrored left to right if `is_mirrored`.
+    /// Converts an image, mirrored left to right if `is_mirrored`.
     pub(super) fn of(image: &GrayImage, is_mirrored: bool) -> Self {
         let (width, height) = (image.width() as usize, image.height() as usize);
         let stride = width.next_multiple_of(LANES) + 2 * REACH[0];
@@ -76,13 +75,13 @@ impl Sixteen {
         Self { is_mirrored, width, height, stride, values, is_none }
     }
 
-    /// Which pixels of a row are none: 255 or 0.
+    /// Validity of the pixels of a row: 255 if invalid, else 0.
     #[inline(always)]
     pub(super) fn is_none(&self, y: usize) -> &[u8] {
         &self.is_none[y * self.width..][..self.width]
     }
 
-    /// The row `y + dy`, or the nearest one.
+    /// The row `y + dy`, clamped to the image.
     #[inline(always)]
     fn row(&self, y: usize, dy: isize) -> &[u16] {
         let y = y.saturating_add_signed(dy).min(self.height - 1);
@@ -90,7 +89,7 @@ impl Sixteen {
     }
 }
 
-/// Makes whole numbers of a row.
+/// Converts a row to integers.
 struct Convert<'a> {
     pixels: &'a [f32],
     values: &'a mut [u16],
@@ -106,7 +105,7 @@ impl WithSimd for Convert<'_> {
         let (values, is_none) = (&mut values[..pixels.len()], &mut is_none[..pixels.len()]);
         let mut invalid = 0;
         for x in 0..pixels.len() {
-            // Casts cut to the range, and make 0 of what is not a number.
+            // Casts saturate, and convert NaN to 0.
             values[x] = ((pixels[x] * 65535.0 + 0.5) as i32).clamp(0, 65535) as u16;
             is_none[x] = if pixels[x].is_finite() { 0 } else { u8::MAX };
             invalid |= is_none[x];
@@ -122,7 +121,7 @@ impl WithSimd for Convert<'_> {
     }
 }
 
-/// The other pixels that each of `P` planes looks at; where one has fewer than eight, the pixel itself, which is never brighter.
+/// Offsets of the pixels compared by each of `P` planes; padded with the pixel itself, which is never brighter.
 fn pattern<const P: usize>() -> [[[isize; 2]; 8]; P] {
     let mut pattern = [[[0; 2]; 8]; P];
     let [reach_x, reach_y] = REACH.map(|reach| reach as isize);
@@ -135,39 +134,39 @@ fn pattern<const P: usize>() -> [[[isize; 2]; 8]; P] {
     pattern
 }
 
-/// The bits of one row.
+/// The census bits of one row.
 pub(super) struct Planes<const P: usize> {
     /// Bytes before the first pixel.
     margin: usize,
     pattern: [[[isize; 2]; 8]; P],
     bits: [Row<u8>; P],
-    /// 255 for what is none, as the margin is.
+    /// 255 for invalid pixels and in the margins.
     is_none: Row<u8>,
 }
 
 impl<const P: usize> Planes<P> {
-    /// Room for a row of an image with `margin` bytes at both ends.
+    /// Buffers for a row of an image with `margin` bytes at both ends.
     pub(super) fn new(image: &Sixteen, margin: usize) -> Self {
         let stride = image.width.next_multiple_of(LANES) + 2 * margin;
         let bits = std::array::from_fn(|_| Row::new(stride, 0));
         Self { margin, pattern: pattern(), bits, is_none: Row::new(stride, u8::MAX) }
     }
 
-    /// Takes row `y` of the image.
+    /// Computes the bits of row `y` of the image.
     pub(super) fn take(&mut self, image: &Sixteen, y: usize) {
         Arch::new().dispatch(Take { image, y, planes: self });
     }
 
-    /// The bits, and which pixels are none.
+    /// Returns the bits, and 255 for each invalid pixel.
     #[inline(always)]
     pub(super) fn views(&self) -> ([&[u8]; P], &[u8]) {
         let is_none = self.is_none.values();
-        // As long as each other, which spares the kernels some comparisons.
+        // Equal lengths save the kernels some bounds checks.
         (std::array::from_fn(|k| &self.bits[k].values()[..is_none.len()]), is_none)
     }
 }
 
-/// Makes the bits of a row.
+/// Computes the bits of a row.
 struct Take<'a, const P: usize> {
     image: &'a Sixteen,
     y: usize,
@@ -204,7 +203,7 @@ impl<const P: usize> WithSimd for Take<'_, P> {
     }
 }
 
-/// The costs of a pixel for the disparities whose partners begin at `at` of the right planes; 255 where `beyond` has it.
+/// Costs of a pixel for the disparities whose partners begin at `at` of the right planes; 255 where `beyond` is.
 #[inline(always)]
 pub(super) fn costs<const N: usize>(
     left: [u8; WHOLE],
@@ -243,7 +242,7 @@ pub(super) fn costs<const N: usize>(
     }
 }
 
-/// The same by the planes of block matching, without `beyond`.
+/// As `costs`, with the planes of block matching and without `beyond`.
 #[inline(always)]
 pub(super) fn sparse_costs<const N: usize>(
     left: [u8; SPARSE],
@@ -265,7 +264,7 @@ pub(super) fn sparse_costs<const N: usize>(
     }
 }
 
-/// Three bits added in every place: the sum's lower bits, and those that are carried.
+/// Carry-save adder on every bit position: the sum bits and the carry bits of three inputs.
 #[inline(always)]
 fn add(a: u8, b: u8, c: u8) -> [u8; 2] {
     let ab = a ^ b;

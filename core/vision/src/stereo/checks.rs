@@ -1,17 +1,17 @@
-//! What a pixel must pass to have a disparity; the first that it does not pass is the reason why it has none.
+//! Gates of a disparity; the first one that a pixel fails is its outcome.
 //!
 //! ```text
-//! both pixels are there  →  t ≥ t_min (`texture`)  →  unique (`winner`)  →  | d − d_R(x − d) | ≤ limit  →  no speckle
+//! both pixels are valid  →  t ≥ t_min (`texture`)  →  unique (`winner`)  →  | d − d_R(x − d) | ≤ limit  →  no speckle
 //! ```
-//! d_R is what the right image's pixel finds among the same sums. Where a surface is hidden from the right eye, its
-//! pixels meet others that are seen better by their own partners.
+//! d_R is the disparity that the right image's pixel finds among the same sums. Pixels of a surface that is occluded in
+//! the right image match pixels that have better partners of their own.
 
 use super::row::RowResult;
 use super::scene::Scene;
 use super::subpixel::fraction;
 use super::{DisparityMap, Outcome, speckle};
 
-/// Writes the disparities and outcomes of row `y`; `texture` is that of the row, empty where it does not count.
+/// Writes the disparities and outcomes of row `y`; `texture` is that of the row, empty if the gate is off.
 pub(super) fn finish_row(
     scene: &Scene<'_>,
     (y, row): (usize, &RowResult),
@@ -42,7 +42,7 @@ pub(super) fn finish_row(
     }
 }
 
-/// Takes the disparities of small patches away.
+/// Removes the disparities of small patches.
 pub(super) fn remove_speckles(map: &mut DisparityMap, least: usize, step_px: f32) {
     for pixels in speckle::small_patches(&map.disparity_px, map.width as usize, least, step_px) {
         map.disparity_px[pixels.clone()].fill(f32::NAN);

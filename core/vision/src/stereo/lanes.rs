@@ -1,8 +1,8 @@
-//! Bytes side by side: as many as the widest vector of any processor holds, in room that begins at a cache line.
+//! Portable vectors: blocks as wide as the widest vector of any processor, in memory aligned to cache lines.
 //!
 //! The innermost loops of this folder run over arrays of [`LANES`] numbers without a branch; inside `pulp`'s dispatch
-//! the compiler makes of them vectors as wide as the processor has. All numbers are whole, so that every width, and
-//! every order of sums, gives the same bits.
+//! the compiler turns them into vectors as wide as the processor has. All numbers are integers, so that every width, and
+//! every order of summation, gives the same bits.
 
 use pulp::Simd;
 #[cfg(target_arch = "x86_64")]
@@ -16,8 +16,8 @@ pub(super) const LANES: usize = 64;
 #[repr(C, align(64))]
 struct Line([u8; LANES]);
 
-/// Numbers where vectors of their size begin: to make a vector of numbers that lie anywhere, the profile that everything is built in
-/// asks each time whether that is allowed.
+/// Arrays aligned like vectors of their size: a cast from a less aligned array to a vector costs an alignment check in
+/// the build profile of the project.
 macro_rules! aligned {
     ($($name:ident($numbers:ty, $align:literal);)*) => {$(
         #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -37,7 +37,7 @@ aligned! {
     FewWords([u16; 8], 16);
 }
 
-/// Numbers in a row that begins at a cache line.
+/// Numbers in a row that is aligned to a cache line.
 #[derive(Clone)]
 pub(super) struct Row<T> {
     lines: Vec<Line>,
@@ -68,7 +68,7 @@ impl<T: bytemuck::Pod> Row<T> {
 /// A block of numbers.
 pub(super) type Block<T> = [T; LANES];
 
-/// `N` blocks of numbers from `at` on.
+/// Returns `N` blocks of numbers starting at `at`.
 #[inline(always)]
 pub(super) fn blocks<const N: usize, T>(values: &[T], at: usize) -> &[Block<T>; N] {
     match values[at..].as_chunks().0.first_chunk() {
@@ -77,7 +77,7 @@ pub(super) fn blocks<const N: usize, T>(values: &[T], at: usize) -> &[Block<T>; 
     }
 }
 
-/// `N` blocks of numbers from `at` on, to change.
+/// Returns `N` mutable blocks of numbers starting at `at`.
 #[inline(always)]
 pub(super) fn blocks_mut<const N: usize, T>(values: &mut [T], at: usize) -> &mut [Block<T>; N] {
     match values[at..].as_chunks_mut().0.first_chunk_mut() {
@@ -86,14 +86,14 @@ pub(super) fn blocks_mut<const N: usize, T>(values: &mut [T], at: usize) -> &mut
     }
 }
 
-/// Bytes that follow each other in blocks, each with the one before it: the last of `before`, and all of `here` but the last.
+/// Shifts a block up by one byte: the last byte of `before`, then all of `here` but the last.
 #[inline(always)]
 pub(super) fn moved_up<S: Simd>(simd: S, before: &[u8; LANES], here: &[u8; LANES]) -> [u8; LANES] {
     #[cfg(target_arch = "x86_64")]
     if size_of::<S::u8s>() == 64 {
         let v4 = same::<S, V4>(simd);
         let [before, here] = [before, here].map(|bytes| bytemuck::cast(Line(*bytes)));
-        // First by whole quarters, then within them.
+        // First by whole 32-bit words, then within them.
         let quarters = v4.avx512f._mm512_alignr_epi32::<12>(here, before);
         let Line(moved) = bytemuck::cast(v4.avx512bw._mm512_alignr_epi8::<15>(here, quarters));
         return moved;
@@ -105,7 +105,7 @@ pub(super) fn moved_up<S: Simd>(simd: S, before: &[u8; LANES], here: &[u8; LANES
     moved
 }
 
-/// The same with the one after it: all of `here` but the first, and the first of `after`.
+/// Shifts a block down by one byte: all of `here` but the first, then the first byte of `after`.
 #[inline(always)]
 pub(super) fn moved_down<S: Simd>(simd: S, here: &[u8; LANES], after: &[u8; LANES]) -> [u8; LANES] {
     #[cfg(target_arch = "x86_64")]
@@ -123,7 +123,7 @@ pub(super) fn moved_down<S: Simd>(simd: S, here: &[u8; LANES], after: &[u8; LANE
     moved
 }
 
-/// The least of bytes.
+/// Minimum of bytes.
 #[inline(always)]
 pub(super) fn least_u8<S: Simd>(simd: S, values: &[u8; LANES]) -> u8 {
     let (mut half, mut few, mut pairs) = ([0; 32], [0; 16], [0; 8]);
@@ -140,7 +140,7 @@ pub(super) fn least_u8<S: Simd>(simd: S, values: &[u8; LANES]) -> u8 {
     least_of_few(simd, pairs) as u8
 }
 
-/// The least of numbers of 16 bits.
+/// Minimum of 16-bit numbers.
 #[inline(always)]
 pub(super) fn least_u16<S: Simd>(simd: S, values: &[u16; LANES]) -> u16 {
     let (mut half, mut quarter, mut few) = ([0; 32], [0; 16], [0; 8]);
@@ -156,14 +156,14 @@ pub(super) fn least_u16<S: Simd>(simd: S, values: &[u16; LANES]) -> u16 {
     least_of_few(simd, few)
 }
 
-/// Which numbers are at most `limit`: the first one's bit is the lowest.
+/// Bit mask of the numbers that are at most `limit`; the lowest bit is the first number.
 #[inline(always)]
 pub(super) fn at_most<S: Simd>(simd: S, values: &[u16; LANES], limit: u16) -> u64 {
     let (halves, _) = values.as_chunks();
     u64::from(half_at_most(simd, halves[0], limit)) | (u64::from(half_at_most(simd, halves[1], limit)) << 32)
 }
 
-/// The same of half as many.
+/// The same for half a block.
 #[inline(always)]
 fn half_at_most<S: Simd>(simd: S, values: [u16; 32], limit: u16) -> u32 {
     #[cfg(target_arch = "x86_64")]
@@ -190,7 +190,7 @@ fn half_at_most<S: Simd>(simd: S, values: [u16; 32], limit: u16) -> u32 {
     bits
 }
 
-/// The least of eight numbers, by the one instruction that finds it where the processor has it.
+/// Minimum of eight numbers, by a single instruction where the processor has it.
 #[inline(always)]
 fn least_of_few<S: Simd>(simd: S, few: [u16; 8]) -> u16 {
     #[cfg(target_arch = "x86_64")]
@@ -210,8 +210,8 @@ fn least_of_few<S: Simd>(simd: S, few: [u16; 8]) -> u16 {
     few.into_iter().fold(u16::MAX, u16::min)
 }
 
-/// The processor's features by the name that they have; that its vectors are as wide as the name says was asked before,
-/// which the compiler answers, so that no other way remains.
+/// Converts the SIMD token to its concrete type. Callers check the vector width first; the compiler evaluates that check
+/// and removes the other branch.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
 fn same<S: Simd, T: Simd>(simd: S) -> T {

@@ -3,28 +3,28 @@
 //! ```text
 //! two images, two cameras ─► align ─► census ─► block_matching │ semi_global ─► checks ─► ranges ─► points
 //! ```
-//! | file | what it does |
+//! | file | contents |
 //! |---|---|
-//! | `align` | two linear cameras whose rows agree, and the images as they see them |
-//! | `census` | the surroundings of a pixel in bits, and how many of them differ: the cost of a disparity |
-//! | `scene` | what both methods read |
+//! | `align` | two linear cameras whose rows agree, and the images resampled to them |
+//! | `census` | the surroundings of a pixel in bits, and the number of differing bits: the cost of a disparity |
+//! | `scene` | input of both methods |
 //! | `block_matching` | sums of costs over a window |
 //! | `semi_global` | sums of costs along paths |
-//! | `winner`, `row` | the cheapest disparity, seen from both eyes |
-//! | `subpixel` | its fraction |
-//! | `texture`, `checks`, `speckle` | which pixels have none, and why |
-//! | `ranges` | points by the true cameras |
-//! | `lanes` | bytes side by side |
+//! | `winner`, `row` | the cheapest disparity of the left and of the right pixels |
+//! | `subpixel` | the fraction of a disparity |
+//! | `texture`, `checks`, `speckle` | pixels without a disparity, and the reason |
+//! | `ranges` | points from the true cameras |
+//! | `lanes` | portable vectors |
 //!
 //! | symbol | our name | unit |
 //! |---|---|---|
 //! | d = x_L − x_R | [`DisparityMap::disparity_px`] | px of the aligned images |
 //! | – | [`DenseStereo::points_m`] | m, in the frame of the cameras |
 //!
-//! A pixel without a disparity is NaN, and its [`Outcome`] says why: holes are left as they are, nothing is filled in.
-//! Sums are whole numbers: the same images give the same bits on every processor and any number of threads.
+//! A pixel without a disparity is NaN, and its [`Outcome`] is the reason; holes are not filled. Sums are integers: the
+//! same images give the same bits on every processor and any number of threads.
 //!
-//! Sources: domain.md 3.3 and 7 (JPL's stereo); Hirschmüller 2008. What it reaches is in docs/stereo.md.
+//! Sources: domain.md 3.3 and 7 (JPL's stereo); Hirschmüller 2008. docs/stereo.md lists its accuracy.
 
 mod lanes;
 pub mod settings;
@@ -61,70 +61,70 @@ pub use settings::{StereoMethod, StereoPaths, StereoSettings};
 use row::RowResult;
 use scene::Scene;
 
-/// What became of a pixel.
+/// Result of matching a pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 #[repr(u8)]
 #[schema(as = StereoOutcome)]
 pub enum Outcome {
-    /// It has a disparity.
+    /// A disparity was found.
     #[default]
     Found,
-    /// It, or the partner that it found, is beside its image or invalid.
+    /// The pixel or its partner is outside its image or invalid.
     Outside,
-    /// Its surroundings have no slope along the row.
+    /// The surroundings have too little gradient along the row.
     NoTexture,
     /// Another disparity is nearly as good.
     NotUnique,
-    /// Its partner finds another pixel.
+    /// The left-right check failed: the partner's best match is another pixel.
     LeftRight,
-    /// It belongs to a patch that is too small.
+    /// The patch of the pixel is too small.
     Speckle,
-    /// Its rays do not meet in front of the cameras, or too far away.
+    /// The rays do not intersect in front of the cameras, or the point is too far away.
     OutOfRange,
 }
 
 /// The disparities of an aligned left image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DisparityMap {
-    /// Pixels in a row.
+    /// Columns of the image.
     pub width: u32,
-    /// Rows.
+    /// Rows of the image.
     pub height: u32,
-    /// x_L − x_R, px, row by row; NaN where there is none.
+    /// x_L − x_R, px, row by row; NaN without a disparity.
     pub disparity_px: Vec<f32>,
-    /// What became of every pixel.
+    /// Result of every pixel.
     pub outcome: Vec<Outcome>,
 }
 
 impl DisparityMap {
-    /// How many pixels have this outcome.
+    /// Number of pixels with an outcome.
     pub fn count(&self, outcome: Outcome) -> usize {
         self.outcome.iter().filter(|found| **found == outcome).count()
     }
 
-    /// The disparity of a pixel, px.
+    /// Disparity of a pixel, px; `None` if it has none.
     pub fn at(&self, x: u32, y: u32) -> Option<f32> {
         let disparity = *self.disparity_px.get((y * self.width + x) as usize).filter(|_| x < self.width)?;
         disparity.is_finite().then_some(disparity)
     }
 }
 
-/// What dense stereo saw and found.
+/// Images, disparities and points of dense stereo.
 #[derive(Clone, Debug)]
 pub struct DenseStereo {
     /// The aligned cameras.
     pub alignment: Alignment,
-    /// The images as they see them.
+    /// The images resampled to the aligned cameras.
     pub images: [GrayImage; 2],
     /// The disparities of the aligned left image.
     pub disparities: DisparityMap,
-    /// For each of its pixels the point, m, in the frame of the cameras; NaN where there is none.
+    /// Point of each pixel of the aligned left image, m, in the frame of the cameras; NaN without a disparity.
     pub points_m: Vec<[f32; 3]>,
 }
 
 impl DenseStereo {
-    /// The point that a pixel of the aligned left image shows, m, in the frame of the cameras.
+    /// Point of a pixel of the aligned left image, m, in the frame of the cameras; `None` without a disparity.
     pub fn point(&self, x: u32, y: u32) -> Option<Point3> {
         let map = &self.disparities;
         let point = self.points_m.get((y * map.width + x) as usize).filter(|_| x < map.width)?;
@@ -132,11 +132,11 @@ impl DenseStereo {
     }
 }
 
-/// Aligns a pair, matches it, and places what it shows by the true cameras, which are in one frame.
+/// Aligns a pair, matches it, and triangulates its points with the true cameras, which must be in one frame.
 ///
 /// # Errors
-/// [`Error::Setting`] for a setting that cannot be used; [`Error::Request`] for a pair that cannot be aligned, or images that
-/// are not as large as their cameras say.
+/// [`Error::Setting`] for an invalid setting; [`Error::Request`] for a pair that cannot be aligned, or images whose size
+/// differs from their cameras'.
 pub fn dense_stereo(
     [left, right]: [&GrayImage; 2],
     cameras: [&Camera; 2],
@@ -145,11 +145,11 @@ pub fn dense_stereo(
     dense_stereo_until([left, right], cameras, settings, Cancel::default())
 }
 
-/// [`dense_stereo_until`] of a scene near a plane, in the frame of the cameras, such as the ground: the pair is aligned about it, and
-/// disparities are relative to its own ([`Alignment::about`]).
+/// As [`dense_stereo_until`], for a scene near a plane such as the ground, in the frame of the cameras: the pair is
+/// aligned about the plane, and disparities are relative to it ([`Alignment::about`]).
 ///
 /// # Errors
-/// As [`dense_stereo_until`], and for a plane that does not lie in front of the left camera.
+/// As [`dense_stereo_until`], and for a plane that is not in front of the left camera.
 pub fn dense_stereo_about(
     images: [&GrayImage; 2],
     cameras: [&Camera; 2],
@@ -160,7 +160,7 @@ pub fn dense_stereo_about(
     dense(images, cameras, Some(plane), settings, cancel)
 }
 
-/// [`dense_stereo`], which ends within a row or an alignment once `cancel` is requested.
+/// As [`dense_stereo`], but ends within a row or an alignment once `cancel` is requested.
 ///
 /// # Errors
 /// As [`dense_stereo`], and [`Error::Cancelled`].
@@ -188,7 +188,7 @@ fn dense(
     let alignment = Alignment::about(cameras[0], cameras[1], plane, &settings.align)?;
     let mut settings = settings.clone();
     if settings.disparity_count == 0 {
-        // Points above the plane: the disparity is plane_px plus less than the disparity of range_min_m.
+        // Points above the plane: the disparity is less than plane_px plus the disparity of range_min_m.
         let nearest = alignment.disparity_px(settings.range_min_m) + alignment.plane_px
             - f64::from(settings.disparity_first_px);
         settings.disparity_count = (nearest.ceil() as u32 + 1).clamp(8, 512);
@@ -200,10 +200,10 @@ fn dense(
     Ok(DenseStereo { alignment, images, disparities, points_m })
 }
 
-/// The disparities of a pair whose rows agree already. Images of different widths must have the left border in common.
+/// Disparities of an aligned pair. Images of different widths must have the left border in common.
 ///
 /// # Errors
-/// [`Error::Setting`] for a setting that cannot be used; [`Error::Request`] for images without pixels or of unequal height.
+/// [`Error::Setting`] for an invalid setting; [`Error::Request`] for images without pixels or of unequal height.
 pub fn disparities(images: [&GrayImage; 2], settings: &StereoSettings) -> Result<DisparityMap> {
     disparities_until(images, settings, Cancel::default())
 }
@@ -241,7 +241,7 @@ fn disparities_until(
     Ok(map)
 }
 
-/// Matches all rows, whose pixels have `N` blocks of cells.
+/// Matches all rows; each pixel has `N` blocks of cells.
 fn match_all<const N: usize>(scene: &Scene<'_>, texture: &[f32], map: &mut DisparityMap) {
     let width = scene.size[0];
     let of_row = |y: usize| texture.get(y * width..(y + 1) * width).unwrap_or_default();

@@ -1,12 +1,12 @@
-//! From a disparity to the point: by the pixels of the real images and the true cameras.
+//! Triangulates the points of the disparities from the pixels of the real images and the true cameras.
 //!
 //! ```text
-//! (x, y), (x − d, y) aligned  →  their places in the real images  →  two rays  →  the midpoint     (triangulate)
+//! (x, y), (x − d, y) aligned  →  their positions in the real images  →  two rays  →  the midpoint     (triangulate)
 //! ```
-//! The aligned cameras only say which pixels belong together; distortion, toe-in and moving pupils are those of the true
-//! models. Points are held in `f32`: 4e-6 m at 50 m.
+//! The aligned cameras only define the correspondence of pixels; distortion, toe-in and moving pupils are those of the
+//! true models. Points are stored as `f32`: 4e-6 m at 50 m.
 //!
-//! Frame: that of the cameras (rover), m.
+//! Frame: the frame of the cameras (rover), m.
 
 use rayon::prelude::*;
 
@@ -15,8 +15,8 @@ use super::{DisparityMap, Outcome};
 use sightline_geometry::camera::Camera;
 use sightline_geometry::estimate::triangulate::midpoint;
 
-/// Gives every pixel that has a disparity its point, row by row, NaN without; those farther than `range_max_m` from the left
-/// camera, and those whose rays do not meet, lose their disparity.
+/// Returns the point of every pixel, row by row, NaN without a disparity. Pixels farther than `range_max_m` from the
+/// left camera, and those whose rays do not intersect, lose their disparity.
 pub(super) fn points(
     map: &mut DisparityMap,
     alignment: &Alignment,

@@ -1,36 +1,36 @@
-//! What a row of pixels found, before anything is checked.
+//! Winners of a row of pixels, before the gates.
 
-/// What a pixel of the left image found.
+/// Winner of a pixel of the left image.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Pixel {
     index: u16,
-    /// The sums of the disparity before, its own, and the one after; `u16::MAX` where there is none.
+    /// Sums of the disparity before, its own, and the one after; `u16::MAX` beyond the range.
     three: [u16; 3],
     is_unique: bool,
-    /// Sums that tell the fraction better.
+    /// Sums that give a more accurate fraction; `None` without them.
     fine: Option<[u16; 3]>,
 }
 
 impl Pixel {
-    /// The winner's place, the sums before, at and after it, and whether no other is nearly as good.
+    /// The winner's index, the sums before, at and after it, and whether no other disparity is nearly as good.
     #[inline(always)]
     pub(super) fn new(index: u16, three: [u16; 3], is_unique: bool) -> Self {
         Self { index, three, is_unique, fine: None }
     }
 
-    /// The place among the disparities.
+    /// Index of the disparity, counted from the first one.
     #[inline(always)]
     pub(super) fn index(self) -> usize {
         usize::from(self.index)
     }
 
-    /// Takes other sums for the fraction, if there are any.
+    /// Sets other sums for the fraction.
     #[inline(always)]
     pub(super) fn refine(&mut self, three: Option<[u16; 3]>) {
         self.fine = three;
     }
 
-    /// Whether no other disparity but its neighbours is nearly as good.
+    /// Returns whether no disparity except its neighbours is nearly as good.
     #[inline(always)]
     pub(super) fn is_unique(self) -> bool {
         self.is_unique
@@ -44,11 +44,11 @@ impl Pixel {
     }
 }
 
-/// What a row found.
+/// Winners of a row.
 pub(super) struct RowResult {
-    /// For each pixel of the left image.
+    /// One per pixel of the left image.
     pub(super) pixels: Vec<Pixel>,
-    /// The place among the disparities that its partner in the right image has.
+    /// Disparity index of each pixel's partner in the right image.
     pub(super) right_index: Vec<u16>,
 }
 
@@ -57,7 +57,8 @@ impl RowResult {
         Self { pixels: vec![Pixel::default(); width], right_index: vec![0; width] }
     }
 
-    /// Takes what the right image's pixels found, in the mirrored order of its planes; the partners of pixel 0 begin at `first`.
+    /// Stores the winners of the right image, in the mirrored order of its planes; the partners of pixel 0 begin at
+    /// `first`.
     #[inline(always)]
     pub(super) fn see_right(&mut self, indices: &[u16], first: usize) {
         for (x, (pixel, right)) in self.pixels.iter().zip(&mut self.right_index).enumerate() {

@@ -1,4 +1,4 @@
-//! What both methods read: an aligned pair in whole numbers, and where disparities lie among its pixels.
+//! Input of both methods: an aligned pair as integers, and the layout of its disparities.
 
 use super::census::Sixteen;
 use super::lanes::{LANES, Row};
@@ -7,30 +7,30 @@ use super::winner::rival_share;
 use crate::image::GrayImage;
 use sightline_geometry::cancel::Cancel;
 
-/// An aligned pair, ready to be matched.
+/// An aligned pair, ready for matching.
 pub(super) struct Scene<'a> {
     /// The left image, fractions of full scale.
     pub(super) image: &'a GrayImage,
-    /// Its columns and rows.
+    /// Columns and rows of the left image.
     pub(super) size: [usize; 2],
-    /// The left image in whole numbers.
+    /// The left image in 16 bits.
     pub(super) left: Sixteen,
-    /// The right one, mirrored.
+    /// The right image in 16 bits, mirrored.
     pub(super) right: Sixteen,
-    /// Bytes before the first pixel of a mirrored row, and behind its last one.
+    /// Bytes before the first pixel of a mirrored row, and after its last one.
     pub(super) margin: usize,
-    /// Where the partners of pixel 0 begin in a mirrored row with its margin; those of pixel x begin x before it.
+    /// Index of the first partner of pixel 0 in a mirrored row with its margin; for pixel x it is x less.
     pub(super) first: usize,
-    /// Their cells: 64, 128, 256 or 512.
+    /// Cells of a pixel, one per disparity: 64, 128, 256 or 512.
     pub(super) cells: usize,
-    /// 0 for the disparities that are asked for, 65535 for those that fill the last block.
+    /// 0 for the requested disparities, 65535 for those that pad the last block.
     pub(super) beyond: Row<u16>,
-    /// 0 and 255 alike, for their costs.
+    /// The same for the costs: 0 or 255.
     pub(super) beyond_costs: Row<u8>,
-    /// By which share another sum must exceed the least one, in 65536ths.
+    /// Fraction by which another sum must exceed the least one, in 65536ths.
     pub(super) rival_share: u64,
     pub(super) settings: &'a StereoSettings,
-    /// Once requested, the remaining rows are left as they are: the result is discarded.
+    /// Once requested, the remaining rows are not matched: the result is discarded.
     pub(super) cancel: Cancel<'a>,
 }
 
@@ -45,7 +45,7 @@ impl<'a> Scene<'a> {
         let cells = count.next_power_of_two().max(LANES);
         let first_px = settings.disparity_first_px as isize;
         let (left_width, right_width) = (left.width() as usize, right.width() as usize);
-        // From the first disparity of the last left pixel to the last one of the first.
+        // From the first disparity of the last left pixel to the last disparity of the first.
         let margin = (cells + first_px.unsigned_abs() + left_width.saturating_sub(right_width) + 1)
             .next_multiple_of(LANES);
         let mut beyond = Row::new(cells, 0);
@@ -70,7 +70,7 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// Bytes of a mirrored row with its margins.
+    /// Bytes of a mirrored row including its margins.
     pub(super) fn right_stride(&self) -> usize {
         self.right.is_none(0).len().next_multiple_of(LANES) + 2 * self.margin
     }

@@ -1,5 +1,5 @@
-//! Semi-global matching: a disparity is cheap where its bits agree and where the pixels before it, along several paths,
-//! found nearly the same one.
+//! Semi-global matching: a disparity is cheap if its census bits agree and if the preceding pixels along several paths
+//! have nearly the same disparity.
 //!
 //! ```text
 //! L_r(p, d) = C(p, d) + min( L_r(p − r, d),  L_r(p − r, d ± 1) + P1,  m + P2 ) − m       m = min_k L_r(p − r, k)
@@ -11,28 +11,28 @@
 //! | C | `census::costs` | bits |
 //! | L_r, m | [`Ring`]'s cells and floors | bits, at most 62 + P2 |
 //! | S | `sums` | bits |
-//! | P1, P2_even, P2_least, a | `StereoSettings::{small_step, large_step, large_step_least, large_step_slope}` | bits; bits per full scale |
-//! | r | from the left, from the right, from above left, above and above right; with eight paths those from below as well | – |
+//! | P1, P2_even, P2_least, a | `small_step`, `large_step`, `large_step_least`, `large_step_slope` | bits; bits/full scale |
+//! | r | from the left, from the right, from above left, above and above right; with eight paths also from below | – |
 //!
-//! **One pass.** Of each of the three paths from above one row of L is held, of the costs and sums one row as well. From
-//! left to right the costs are taken and four paths go on; from right to left follows the fifth, and its sums
-//! are complete. L fits into bytes, since C ≤ 62 and P2 ≤ 180, so that 64 disparities are one vector; those
-//! that fill the last vector cost 255 and no path goes through them.
+//! **One pass.** For each of the three paths from above one row of L is stored, and one row of costs and of sums. From
+//! left to right the costs are computed and four paths advance; the fifth runs from right to left and completes the
+//! sums. L fits into bytes, since C ≤ 62 and P2 ≤ 180, so that 64 disparities are one vector; those that pad the last
+//! vector cost 255 and no path uses them.
 //!
-//! **Where the rows of L lie.** A path that comes from above reads the cells of pixel x − 1, x or x + 1 and writes those of x. In a
-//! ring of W + 2 places every pixel writes one place before that which it reads: what it overwrites was read by the pixel
-//! before it, and next to the 64 bytes of a store there is never a load of what was stored just now. The path along the row would
-//! load just that, in bytes that two stores have written: [`Side`] moves it by one disparity in vectors instead.
+//! **Layout of the rows of L.** A path from above reads the cells of pixel x − 1, x or x + 1 and writes those of x. In a
+//! ring of W + 2 places every pixel writes one place before the one that it reads: it overwrites cells that the previous
+//! pixel read, and no load overlaps the 64 bytes of a recent store. The path along the row would load bytes that two
+//! recent stores have written; [`Side`] therefore shifts L by one disparity in vectors instead.
 //!
-//! **Eight paths** are the same pass from below, upside down, whose four paths are kept for the whole image and added
-//! to the first one's.
+//! **Eight paths** are the same pass from below, upside down; its four paths are stored for the whole image and added to
+//! those of the first pass.
 //!
-//! **The bound.** In vectors of 512 bits, for 64 cells of five paths: 49 operations for their bits, 6 for each path, 5 for their
-//! least, 8 that move L of the side by one disparity, 26 for the sums, 6 for the right image's winners and 10 for the left one's:
-//! 134, or 2.1 a pixel and disparity; and 75 a pixel for six least numbers of a vector. 1024 × 1024 pixels with 128 disparities
-//! take 90 M cycles of four operations, 22 ms at 4.1 GHz; 10 stores for 64 cells are 5 ms beside it, and what is held, three rows of L,
-//! C and S, lies in the second cache (0.8 MB). Measured
-//! times: `docs/benchmarks.md`.
+//! **Lower bound of the time.** In vectors of 512 bits, for 64 cells of five paths: 49 operations for their bits, 6 for
+//! each path, 5 for their least, 8 that shift L of the side by one disparity, 26 for the sums, 6 for the right image's
+//! winners and 10 for the left one's: 134, or 2.1 per pixel and disparity; and 75 per pixel for six minima of a vector.
+//! 1024 × 1024 pixels with 128 disparities take 90 M cycles of four operations, 22 ms at 4.1 GHz; 10 stores for 64 cells
+//! take 5 ms in parallel. The working set, three rows of L, C and S, fits into the L2 cache (0.8 MB). Measured times:
+//! `docs/benchmarks.md`.
 
 use pulp::{Arch, Simd, WithSimd};
 
@@ -44,15 +44,15 @@ use super::settings::{StereoPaths, StereoSettings};
 use super::subpixel::three_along_row;
 use super::winner::{RightWinners, winner};
 
-/// Paths from above.
+/// Number of paths from above.
 const ABOVE: usize = 3;
 
-/// P2 of the pixels of a row, each against its neighbour at x + `shift` in `there`; against itself where there is none.
+/// P2 of the pixels of a row, each against its neighbour at x + `shift` in `there`; P2_even without a neighbour.
 #[inline(always)]
 fn large_steps(settings: &StereoSettings, here: &[f32], there: &[f32], shift: isize, out: &mut [u8]) {
     let (even, least) = (settings.large_step as f32, settings.large_step_least as f32);
     let slope = settings.large_step_slope as f32;
-    // What is invalid is no edge: NaN is never less.
+    // Beside an invalid pixel P2 is P2_least: `min` ignores NaN.
     let (from, to) = (shift.min(0).unsigned_abs(), shift.max(0).unsigned_abs());
     let middle = here.len().saturating_sub(from + to);
     out.fill(settings.large_step as u8);
@@ -62,14 +62,14 @@ fn large_steps(settings: &StereoSettings, here: &[f32], there: &[f32], shift: is
     }
 }
 
-/// A row of L of one path. A place holds 64 bytes of 255, which stand for disparities that do not exist, and the cells.
+/// A row of L of one path. A place contains 64 bytes of 255, for disparities outside the range, and the cells.
 ///
-/// Rows move down by 0, 1 or 2 places, so that a path that comes from x − 1, x or x + 1 always reads the place after the one
-/// that it writes. Places that nothing was written to hold zeros, which is how a path begins.
+/// Rows move down by 0, 1 or 2 places, so that a path from x − 1, x or x + 1 always reads the place after the one that
+/// it writes. Unwritten places are zero, the initial value of a path.
 struct Ring {
-    /// The place of the first pixel of the row that is written.
+    /// Place of the first pixel of the row being written.
     base: usize,
-    /// By how many places a row lies before the row above.
+    /// Number of places between a row and the row above.
     shift: usize,
     cells: Row<u8>,
     /// m of each place.
@@ -86,7 +86,7 @@ impl Ring {
         Self { base: shift * height, shift, cells: row, floors: vec![0; places] }
     }
 
-    /// The cells to write for pixel `x`, and those that its path comes from, for a large step of the price `large`.
+    /// Returns the cells of pixel `x` to write and the preceding cells of its path; `large` and `small` are P2 and P1.
     #[inline(always)]
     fn open<const N: usize>(
         &mut self,
@@ -106,7 +106,7 @@ impl Ring {
     }
 }
 
-/// L_r of the pixel before, of d − 1, d and d + 1, and what a step costs.
+/// L_r of the preceding pixel at d − 1, d and d + 1, and the penalties.
 #[derive(Clone, Copy)]
 struct Before<'a, const N: usize> {
     less: &'a [Block<u8>; N],
@@ -118,7 +118,7 @@ struct Before<'a, const N: usize> {
 }
 
 impl<'a, const N: usize> Before<'a, N> {
-    /// Of cells with a margin of 64.
+    /// From cells with a margin of 64 bytes.
     #[inline(always)]
     fn new(from: &'a [u8], floor: u8, large: u8, small: u8) -> Self {
         Self {
@@ -131,7 +131,7 @@ impl<'a, const N: usize> Before<'a, N> {
         }
     }
 
-    /// One block of L_r.
+    /// Computes one block of L_r.
     #[inline(always)]
     fn step(&self, block: usize, cost: &Block<u8>) -> Block<u8> {
         let (less, same, more) = (&self.less[block], &self.same[block], &self.more[block]);
@@ -144,7 +144,8 @@ impl<'a, const N: usize> Before<'a, N> {
     }
 }
 
-/// The path along the row: L of the pixel before, of d − 1, d and d + 1. It is held in vectors, since the next pixel waits for it.
+/// The path along the row: L of the preceding pixel at d − 1, d and d + 1, in vectors because the next pixel depends on
+/// it.
 struct Side<const N: usize> {
     less: [Block<u8>; N],
     same: [Block<u8>; N],
@@ -153,7 +154,7 @@ struct Side<const N: usize> {
 }
 
 impl<const N: usize> Side<N> {
-    /// As a path begins.
+    /// The initial state of a path.
     fn new() -> Self {
         let none = [[0; LANES]; N];
         Self { less: none, same: none, more: none, floor: 0 }
@@ -165,7 +166,7 @@ impl<const N: usize> Side<N> {
         Before { less, same, more, floor: *floor, cap: floor.wrapping_add(large), small }
     }
 
-    /// Goes on to a pixel, whose least L is among `low`.
+    /// Advances to a pixel with the given `cells`, whose least L is among `low`.
     #[inline(always)]
     fn go<S: Simd>(&mut self, simd: S, cells: &[Block<u8>; N], low: &Block<u8>) {
         self.floor = least_u8(simd, low);
@@ -189,7 +190,7 @@ fn lower(low: &mut Block<u8>, cells: &Block<u8>) {
 
 /// The state of a pass.
 struct Pass {
-    /// The bits of the row, on the left and on the right.
+    /// Census bits of the row, left and right.
     bits: [Planes<WHOLE>; 2],
     rings: [Ring; ABOVE],
     costs: Row<u8>,
@@ -212,7 +213,7 @@ impl Pass {
         }
     }
 
-    /// Goes on to row `y`, whose paths come from row `from_y`.
+    /// Advances to row `y`, whose paths come from row `from_y`.
     fn begin(&mut self, scene: &Scene<'_>, y: usize, from_y: Option<usize>) {
         for ring in &mut self.rings {
             ring.base -= ring.shift;
@@ -223,7 +224,7 @@ impl Pass {
     }
 }
 
-/// The prices of the large steps of a row.
+/// Computes P2 of a row.
 struct Begin<'a> {
     scene: &'a Scene<'a>,
     pass: &'a mut Pass,
@@ -248,7 +249,7 @@ impl WithSimd for Begin<'_> {
     }
 }
 
-/// The results of all rows, given to `take` from top to bottom.
+/// Matches all rows and passes each result to `take`, from top to bottom.
 pub(super) fn match_rows<const N: usize>(scene: &Scene<'_>, mut take: impl FnMut(usize, &RowResult)) {
     let [width, height] = scene.size;
     let mut result = RowResult::new(width);
@@ -337,7 +338,7 @@ impl<const N: usize> WithSimd for FromLeft<'_, N> {
     }
 }
 
-/// From right to left: the last path, and what wins.
+/// From right to left: the last path, and the winners.
 struct FromRight<'a, const N: usize> {
     scene: &'a Scene<'a>,
     pass: &'a mut Pass,
@@ -363,7 +364,7 @@ impl<const N: usize> WithSimd for FromRight<'_, N> {
             let (cost, sums): (&[Block<u8>; N], &[Block<u16>; N]) = (blocks(cost, 0), blocks(sums, 0));
             let step = if x + 1 == width { large[x] } else { large[x + 1] };
             let (mut to, before) = ([[0; LANES]; N], side.before([step, small]));
-            // Sums in an array of their own become vectors; those of the row would be looked at one by one.
+            // Sums in an array of their own are vectorised; those in the row would be read one by one.
             let (mut low, mut whole) = ([u8::MAX; LANES], [[0u16; LANES]; N]);
             for k in 0..N {
                 let l = before.step(k, &cost[k]);

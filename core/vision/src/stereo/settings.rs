@@ -1,8 +1,8 @@
-//! What a person may change about dense stereo.
+//! Settings of dense stereo.
 //!
 //! Sources: domain.md 7 (JPL's correlator); Hirschmüller, *Stereo Processing by Semiglobal Matching and Mutual
-//! Information*, PAMI 2008 (P1, P2, paths, the checks after it). Those marked *ours* were chosen on the
-//! pairs of docs/stereo.md.
+//! Information*, PAMI 2008 (P1, P2, paths, post-processing). Values marked *ours* were chosen on the pairs of
+//! docs/stereo.md.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -10,25 +10,25 @@ use utoipa::ToSchema;
 use super::align::AlignSettings;
 use sightline_geometry::error::{Error, Result};
 
-/// How pixels of the two images are compared.
+/// Method of matching the pixels of the two images.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum StereoMethod {
-    /// Each pixel by its own window: quick; needs texture in every window, and widens what stands in front.
+    /// Each pixel by its own window: fast; needs texture in every window, and widens foreground objects.
     BlockMatching,
     /// Each pixel by its neighbourhood along several paths: closes gaps of weak texture and keeps outlines.
     #[default]
     SemiGlobal,
 }
 
-/// Along how many paths semi-global matching sums.
+/// Number of paths over which semi-global matching sums.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum StereoPaths {
     /// From both sides along the row and from the row above: one pass, some rows of memory.
     #[default]
     Five,
-    /// From the row below as well: two passes and the costs of the whole image in memory, two bytes a cell.
+    /// Also from the row below: two passes, and the sums of the whole image in memory, two bytes per cell.
     Eight,
 }
 
@@ -36,46 +36,47 @@ pub enum StereoPaths {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct StereoSettings {
-    /// How pixels are compared.
+    /// Method of matching.
     pub method: StereoMethod,
-    /// How the pair is aligned.
+    /// Settings of the epipolar alignment.
     pub align: AlignSettings,
-    /// Nearest depth, m, 0.05 to 1000 (0.5: ours); it counts where `disparity_count` is 0.
+    /// Nearest depth, m, 0.05 to 1000 (0.5: ours); used if `disparity_count` is 0.
     pub range_min_m: f64,
-    /// Points farther than this from the left camera are left out, m, 0.1 to 100 000 (100: ours).
+    /// Largest distance of a point from the left camera, m, 0.1 to 100 000 (100: ours).
     pub range_max_m: f64,
-    /// The smallest disparity, px, −1024 to 1024 (0: what lies at infinity in an aligned pair). Above 0, what is far has no
-    /// answer or a wrong one.
+    /// The smallest disparity, px, −1024 to 1024 (0: infinity in an aligned pair). Above 0, distant points have no
+    /// disparity or a wrong one.
     pub disparity_first_px: i32,
-    /// How many disparities follow, 8 to 512, or 0: as many as `range_min_m` asks for (0). Too few: what is near has no
-    /// answer; too many: time, and more places to be wrong.
+    /// Number of disparities, 8 to 512, or 0: as many as `range_min_m` requires (0). Too few: near points have no
+    /// disparity; too many: slower, and more false matches.
     pub disparity_count: u32,
-    /// Side of the window of block matching, odd, 5 to 31 px (11: ours). Too small: noise; too large: outlines
-    /// grow and thin things go.
+    /// Side of the window of block matching, odd, 5 to 31 px (11: ours). Too small: noise; too large: outlines grow and
+    /// thin objects vanish.
     pub window_px: u32,
-    /// P1: the price of a step of one disparity from pixel to pixel, 0 to 60 bits of the census (16: ours). Too
+    /// P1: penalty of a disparity step of one between neighbouring pixels, 0 to 60 bits of the census (16: ours). Too
     /// high: slopes become stairs.
     pub small_step: u32,
-    /// P2: the price of a larger step where the image is even, up to 180 bits (100: ours). Too high: things in front
-    /// are lost in what is behind them; too low: noise.
+    /// P2: penalty of a larger step where the image has no edge, up to 180 bits (100: ours). Too high: foreground
+    /// objects merge with the background; too low: noise.
     pub large_step: u32,
-    /// P2 where the image itself has an edge, which is where depth may jump, bits (30: ours).
+    /// Lower bound of P2, at image edges, where depth discontinuities are likely, bits (30: ours).
     pub large_step_least: u32,
-    /// How quickly P2 falls with the difference of the two pixels: bits per full scale (300: ours).
+    /// Decrease of P2 with the difference of the two pixels: bits per full scale (300: ours).
     pub large_step_slope: f64,
-    /// Along how many paths.
+    /// Number of paths.
     pub paths: StereoPaths,
-    /// Least mean absolute slope of the image along the row within a window of 9 × 9 px, fraction of full scale per px
-    /// (0.001; 0: off). Below it a pixel says nothing about where it is.
+    /// Least mean absolute gradient of the image along the row within a window of 9 × 9 px, fraction of full scale per
+    /// px (0.001; 0: off). With less, a match is not reliable.
     pub texture_min: f64,
-    /// The best disparity must be better than any that is no neighbour by this share, 0 to 1 (0.05: ours; 0: off).
+    /// Fraction by which the best sum must be below that of any other disparity except its neighbours, 0 to 1 (0.05:
+    /// ours; 0: off).
     pub uniqueness_min: f64,
-    /// How far the disparity that the right image finds for the partner may lie from the left one's, px (1: domain.md 7;
-    /// negative: off).
+    /// Largest difference between the disparities of the left pixel and of its partner in the right image, px (1:
+    /// domain.md 7; negative: off).
     pub left_right_max_px: f64,
-    /// Patches of fewer pixels are left out (100, OpenCV's custom; JPL 64; 0: off).
+    /// Patches of fewer pixels are removed (100: as usual in OpenCV; JPL 64; 0: off).
     pub speckle_px: u32,
-    /// Neighbours that differ by at most this belong to one patch, px (1: ours).
+    /// Largest difference of neighbouring disparities within a patch, px (1: ours).
     pub speckle_step_px: f64,
 }
 
@@ -104,10 +105,10 @@ impl Default for StereoSettings {
 }
 
 impl StereoSettings {
-    /// Whether the numbers can be used.
+    /// Checks the ranges of all settings.
     ///
     /// # Errors
-    /// [`Error::Setting`] that names the first one that cannot.
+    /// [`Error::Setting`] with the name of the first invalid one.
     pub fn check(&self) -> Result<()> {
         let within = |key: &str, value: f64, low: f64, high: f64| {
             if (low..=high).contains(&value) {

@@ -1,21 +1,21 @@
-//! Small patches that nothing around them agrees with are left out (domain.md 7, step 7).
+//! Speckle filter: removes small patches that differ from their surroundings (domain.md 7, step 7).
 //!
-//! Two neighbours (left and right, above and below) that both have a disparity belong to one patch when these differ by at
-//! most a step. A row falls into runs; runs that touch those of the row above are joined as sets are: each points to
-//! an earlier one of its patch, the first to itself.
+//! Two neighbours (left and right, above and below) with disparities belong to one patch if these differ by at most a
+//! step. Rows are split into runs; touching runs of consecutive rows are joined by union-find: each run points to an
+//! earlier one of its patch, the first to itself.
 
-/// Pixels of a row that follow each other in one patch.
+/// Consecutive pixels of a row in one patch.
 struct Run {
-    /// The first pixel, among all, and one beyond the last.
+    /// Index of the first pixel in the image, and one past the last.
     start: usize,
     end: usize,
-    /// An earlier run of the patch, or itself.
+    /// Index of an earlier run of the patch, or of itself.
     parent: usize,
-    /// Pixels of the patch, where the run is its first.
+    /// Pixels of the patch, in its first run only.
     pixels: usize,
 }
 
-/// The pixels, run by run, that belong to a patch of fewer than `least`; NaN is no disparity.
+/// Returns the pixels, run by run, of patches with fewer than `least` pixels; NaN is no disparity.
 pub(super) fn small_patches(
     disparity_px: &[f32],
     width: usize,
@@ -23,7 +23,7 @@ pub(super) fn small_patches(
     step_px: f32,
 ) -> Vec<std::ops::Range<usize>> {
     let mut runs: Vec<Run> = Vec::new();
-    // The first run of the row above.
+    // The first run of the row above that may touch.
     let mut above = 0;
     for (y, row) in disparity_px.chunks_exact(width.max(1)).enumerate() {
         let first = runs.len();
@@ -63,7 +63,7 @@ pub(super) fn small_patches(
     small.map(|at| runs[at].start..runs[at].end).collect()
 }
 
-/// The first run of the patch; the way there is halved.
+/// First run of the patch, with path halving.
 fn root(runs: &mut [Run], mut at: usize) -> usize {
     while runs[at].parent != at {
         runs[at].parent = runs[runs[at].parent].parent;
@@ -72,7 +72,7 @@ fn root(runs: &mut [Run], mut at: usize) -> usize {
     at
 }
 
-/// The first run of the patch.
+/// First run of the patch.
 fn root_of(runs: &[Run], mut at: usize) -> usize {
     while runs[at].parent != at {
         at = runs[at].parent;

@@ -1,4 +1,4 @@
-//! The fraction of a pixel that three sums tell.
+//! The fraction of a disparity, from the sums of three neighbouring disparities.
 //!
 //! ```text
 //! δ = (S₋ − S₊) / (2 (max(S₋, S₊) − S₀))        two lines of equal slope through the three
@@ -8,15 +8,16 @@
 //! | S₋, S₀, S₊ | `before`, `best`, `after`: sums at d₁ − 1, d₁, d₁ + 1 | bits |
 //! | δ | [`fraction`] | px |
 //!
-//! Departure from JPL's parabola (domain.md 7, step 4): bits that differ grow about as the distance does, not as its square,
-//! and a parabola would draw disparities to whole pixels. The sums of paths draw them there as well, since a step of one
-//! disparity has its price. Semi-global matching therefore takes the fraction from the costs themselves, summed over some
-//! pixels of the row ([`three_along_row`]); where these have their least elsewhere, the sums of the paths remain (ours).
+//! Departure from JPL's parabola (domain.md 7, step 4): the number of differing bits grows about linearly with the
+//! distance, not with its square, and a parabola would bias disparities towards whole pixels. The sums of paths have the
+//! same bias, because a step of one disparity has a penalty. Semi-global matching therefore computes the fraction from
+//! the costs themselves, summed over some pixels of the row ([`three_along_row`]); if these have their minimum
+//! elsewhere, the sums of the paths are used (ours).
 
-/// Half of the pixels of a row over which costs are summed.
+/// Half of the number of pixels over which costs are summed.
 const HALF: usize = 4;
 
-/// From −½ to ½ px, by the sums of the disparity before, the best one, and the one after.
+/// Returns −½ to ½ px, from the sums of the disparity before, the best one, and the one after.
 #[inline(always)]
 pub(super) fn fraction([before, best, after]: [u16; 3]) -> f32 {
     let (before, after) = (f32::from(before) - f32::from(best), f32::from(after) - f32::from(best));
@@ -24,8 +25,9 @@ pub(super) fn fraction([before, best, after]: [u16; 3]) -> f32 {
     if steeper > 0.0 { (before - after) / (2.0 * steeper) } else { 0.0 }
 }
 
-/// Costs of the disparities before, at and after the place `index`, summed over pixels of the row beside `x`; `costs` are those
-/// of the row, `cells` for each of its `width` pixels. `None` where the middle is not the least.
+/// Costs of the disparities before, at and after `index`, summed over pixels of the row around `x`; `costs` are those of
+/// the row, `cells` for each of its `width` pixels. `None` if the middle one is not the least, or at either end of the
+/// range.
 #[inline(always)]
 pub(super) fn three_along_row(
     costs: &[u8],

@@ -1,10 +1,10 @@
-//! Dense stereo against sums that are taken one by one, and against scenes whose disparities are known.
+//! Dense stereo against direct sums, and against scenes with known disparities.
 
 use image::Luma;
 
 use super::*;
 
-/// No checks.
+/// Settings with all gates off.
 fn plain(method: StereoMethod, first: i32, count: u32) -> StereoSettings {
     StereoSettings {
         method,
@@ -24,7 +24,7 @@ fn hash(x: u32, y: u32) -> f32 {
     (h >> 8) as f32 / 16_777_216.0
 }
 
-/// A smooth texture without repetition at any place of a plane.
+/// A smooth texture without repetition.
 fn texture(x: f64, y: f64) -> f32 {
     let wave = |k: u32| {
         let (turn, length) = (f64::from(k) * 2.399_963, 5.0 * 1.17_f64.powi(k as i32));
@@ -34,7 +34,7 @@ fn texture(x: f64, y: f64) -> f32 {
     (0.5 + 0.06 * (0..14).map(wave).sum::<f64>()).clamp(0.0, 1.0) as f32
 }
 
-/// Both images of a surface whose disparity at the left pixel (x, y) is `disparity(x, y)`, which changes slowly.
+/// Both images of a surface whose disparity at the left pixel (x, y) is `disparity(x, y)`, which must change slowly.
 fn pair([width, height]: [u32; 2], disparity: impl Fn(f64, f64) -> f64) -> [GrayImage; 2] {
     let left = GrayImage::from_fn(width, height, |x, y| Luma([texture(x.into(), y.into())]));
     let right = GrayImage::from_fn(width, height, |x, y| {
@@ -48,7 +48,7 @@ fn pair([width, height]: [u32; 2], disparity: impl Fn(f64, f64) -> f64) -> [Gray
     [left, right]
 }
 
-/// The cost of a cell, bit by bit; block matching looks at a part of the pixels.
+/// The cost of a cell, bit by bit; block matching compares a subset of the pixels.
 fn cost([left, right]: [&GrayImage; 2], [x, y]: [i32; 2], disparity: i32, method: StereoMethod) -> u32 {
     let is_block = method == StereoMethod::BlockMatching;
     let at = |image: &GrayImage, x: i32, y: i32| {
@@ -72,7 +72,7 @@ fn cost([left, right]: [&GrayImage; 2], [x, y]: [i32; 2], disparity: i32, method
     bits
 }
 
-/// Sums of every cell along the paths, by the recurrence as it is printed.
+/// Sums of every cell along the paths, by the recurrence as printed.
 fn path_sums(costs: &[Vec<u32>], left: &GrayImage, settings: &StereoSettings) -> Vec<Vec<u32>> {
     let (width, height) = (left.width() as i32, left.height() as i32);
     let mut paths = vec![[1, 0], [-1, 0], [1, 1], [0, 1], [-1, 1]];
@@ -123,7 +123,7 @@ fn window_sums(costs: &[Vec<u32>], [width, height]: [i32; 2], half: i32) -> Vec<
     (0..width * height).map(sum).collect()
 }
 
-/// What wins when everything is summed one by one: whole disparities, and the partners' own.
+/// Winners from direct sums: index of the disparity of every left pixel.
 fn expected(images: [&GrayImage; 2], settings: &StereoSettings) -> Vec<usize> {
     let [left, _] = images;
     let (width, height) = (left.width() as i32, left.height() as i32);
@@ -160,11 +160,11 @@ fn found(images: [&GrayImage; 2], settings: &StereoSettings) -> Vec<usize> {
 
 #[test]
 fn both_methods_find_what_sums_taken_one_by_one_find() {
-    // Noise on a surface, so that many disparities are near each other, in an image no wider than a few blocks.
+    // A noisy surface, so that many disparities have similar costs, in an image no wider than a few blocks.
     let [left, right] = pair([75, 33], |x, y| 6.0 + 0.05 * x + 0.1 * y);
     let noisy = |image: &GrayImage, seed: u32| {
         GrayImage::from_fn(image.width(), image.height(), |x, y| {
-            // Whole numbers of 255, since the census looks at 16 bits.
+            // Multiples of 1/255, since the census uses 16 bits.
             Luma([((image.get_pixel(x, y)[0] * 0.8 + 0.2 * hash(x + seed, y)) * 255.0).round() / 255.0])
         })
     };
@@ -212,7 +212,7 @@ fn every_hole_has_its_own_reason() {
     let [left, right] = pair([160, 96], |_, _| 12.0);
     let settings = |method| StereoSettings { method, disparity_count: 32, ..StereoSettings::default() };
     for method in [StereoMethod::SemiGlobal, StereoMethod::BlockMatching] {
-        // A flat square, one that is invalid, and one that only the left eye sees.
+        // A square without texture, an invalid one, and one that is visible in the left image only.
         let painted = |image: &GrayImage, shift: u32, is_right: bool| {
             GrayImage::from_fn(160, 96, |x, y| {
                 let value = image.get_pixel(x, y)[0];
@@ -265,14 +265,14 @@ fn what_repeats_along_the_row_is_not_unique() {
         "{:?}",
         map.outcome[30 * 160 + 80]
     );
-    // With room for one period only it is.
+    // With a range of less than one period it is unique.
     let map = disparities([&image, &image], &StereoSettings { disparity_count: 8, ..settings }).unwrap();
     assert!(inside.into_iter().all(|at| map.disparity_px[at] == 0.0));
 }
 
 #[test]
 fn a_surface_behind_an_edge_is_left_out_where_the_right_eye_cannot_see_it() {
-    // In front of a wall at 8 px stands a board at 24 px: 16 columns to its left are hidden from the right eye.
+    // A board at 24 px in front of a wall at 8 px: 16 columns to its left are occluded in the right image.
     let wall = |x: u32, y: u32| texture(f64::from(x), f64::from(y));
     let board = |x: u32, y: u32| texture(f64::from(x) + 777.0, f64::from(y) - 345.0);
     let left = GrayImage::from_fn(240, 80, |x, y| Luma([if x >= 120 { board(x, y) } else { wall(x, y) }]));

@@ -1,10 +1,10 @@
-//! Whether a pixel's surroundings say anything about where along the row it is.
+//! Texture of a pixel's surroundings along the row.
 //!
 //! ```text
 //! t(p) = mean over 9 × 9 px of | I(x + 1, y) − I(x, y) |        fraction of full scale per px
 //! ```
-//! At the border the window is cut. Sums run over whole numbers (full scale 65535), so that they can be taken from row to
-//! row by one more and one less without an error that adds up. What is invalid has no slope.
+//! At the border the window is clipped. Sums are integers (full scale 65535), so that they can be updated from row to
+//! row without accumulating errors. Invalid pixels have gradient 0.
 
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
@@ -13,10 +13,10 @@ use crate::image::GrayImage;
 
 /// Half of the window, px.
 const HALF: usize = 4;
-/// What 1 becomes.
+/// Integer value of full scale.
 const SCALE: f32 = 65535.0;
 
-/// Rows that are made at a time.
+/// Rows that are processed together.
 const BAND: usize = 64;
 
 /// t of every pixel, row by row.
@@ -45,7 +45,7 @@ impl WithSimd for Band<'_> {
         let Self { image, first, means } = self;
         let (width, height) = (image.width() as usize, image.height() as usize);
         let rows = first..first + means.len() / width;
-        // Sums over the rows of the window, with a margin that has no slope, and over its columns as well.
+        // Column sums over the rows of the window, with a margin without gradient, and sums of these over its columns.
         let (mut down, mut across) = (vec![0i32; width + 2 * HALF], vec![0i32; width]);
         let row = |y: usize| &image.as_raw()[y * width..][..width];
         for y in rows.start.saturating_sub(HALF)..(rows.start + HALF).min(height) {
@@ -78,13 +78,13 @@ impl WithSimd for Band<'_> {
     }
 }
 
-/// Adds the slopes of a row to the sums, `sign` times.
+/// Adds the gradients of a row to the sums, multiplied by `sign`.
 #[inline(always)]
 fn change(row: &[f32], sign: i32, sums: &mut [i32]) {
     let (left, right) = (&row[..row.len() - 1], &row[1..]);
     let sums = &mut sums[HALF..][..left.len()];
     for x in 0..left.len() {
-        // The cast makes 0 of what is not a number.
+        // The cast converts NaN to 0.
         let slope = ((right[x] - left[x]).abs() * SCALE) as i32;
         sums[x] = sums[x].wrapping_add(sign.wrapping_mul(slope));
     }

@@ -1,4 +1,5 @@
-//! What is written for one kind of vectors gives the same with any: what the processor has, half as wide, and none.
+//! Code with instructions for one vector width gives the same result with every width: the processor's, half of it, and
+//! scalar.
 
 use pulp::{Arch, Scalar, Simd, WithSimd};
 
@@ -6,7 +7,7 @@ use super::lanes::{Block, LANES, at_most, least_u8, least_u16, moved_down, moved
 use super::row::Pixel;
 use super::winner::{rival_share, winner};
 
-/// The same work with vectors of every width that the processor has.
+/// Runs the same work with vectors of every width that the processor has.
 fn with_every_width<W: WithSimd + Copy>(work: W) -> Vec<W::Output> {
     let mut found = vec![Arch::new().dispatch(work), work.with_simd(Scalar)];
     #[cfg(target_arch = "x86_64")]
@@ -14,7 +15,7 @@ fn with_every_width<W: WithSimd + Copy>(work: W) -> Vec<W::Output> {
     found
 }
 
-/// Numbers without an order.
+/// Pseudo-random numbers.
 fn number(k: usize) -> u16 {
     ((k as u32 + 1).wrapping_mul(0x9E37_79B1) >> 13) as u16
 }
@@ -67,7 +68,8 @@ impl WithSimd for Winning<'_> {
 fn a_winner_is_unique_where_all_but_its_neighbours_cost_more_by_the_share_that_is_asked_for() {
     let share = rival_share(0.05);
     for at in [0, 1, 31, 32, 63, 64, 65, 126, 127_usize] {
-        // 1000 / 0.95 is 1052.6: from 1053 on nothing is a rival; neighbours never are, and of equals the first one wins.
+        // 1000 / 0.95 is 1052.6: sums from 1053 on are no rivals; neighbours never are, and of equal sums the first one
+        // wins.
         for (rival, is_unique) in [(1000, false), (1052, false), (1053, true)] {
             for rival_at in (0..128_usize).filter(|rival_at| rival_at.abs_diff(at) > 1) {
                 let mut cells = [2000_u16; 128];

@@ -1,4 +1,4 @@
-//! The disparity of a pixel: the cheapest, and whether it is the only one.
+//! The winner of a pixel: the cheapest disparity, and whether it is unique.
 //!
 //! ```text
 //! d₁ = argmin S(d)      unique where  S(d) > S(d₁) + ⌊S(d₁) u / (1 − u)⌋  for all d with |d − d₁| > 1
@@ -10,21 +10,22 @@
 //! | u | `StereoSettings::uniqueness_min` | – |
 //! | u / (1 − u) | [`rival_share`] | 1 / 65536 |
 //!
-//! The same sums serve the right image: those of its pixel q are S(q + d, d), which are met while the left pixels go
-//! by ([`RightWinners`]). Of equal sums the smaller disparity wins on the left; on the right it may be any of them.
+//! The same sums serve the right image: those of its pixel q are S(q + d, d), which occur while the left pixels are
+//! processed ([`RightWinners`]). Of equal sums the smaller disparity wins on the left; on the right it may be any of
+//! them.
 
 use pulp::Simd;
 
 use super::lanes::{Block, LANES, Row, at_most, blocks_mut, least_u16};
 use super::row::Pixel;
 
-/// By which share of the least sum another one must exceed it, in 65536ths.
+/// Fraction by which another sum must exceed the least one, in 65536ths.
 pub(super) fn rival_share(uniqueness_min: f64) -> u64 {
-    // With 1 every sum but zero has rivals.
+    // At 1 every sum but zero has rivals.
     (65536.0 * uniqueness_min / (1.0 - uniqueness_min).max(1e-6)).round() as u64
 }
 
-/// The cheapest of `cells`; those that no disparity belongs to hold `u16::MAX`.
+/// The cheapest of `cells`; cells without a disparity contain `u16::MAX`.
 #[inline(always)]
 pub(super) fn winner<S: Simd, const N: usize>(simd: S, cells: &[Block<u16>; N], rival_share: u64) -> Pixel {
     let mut low = [u16::MAX; LANES];
@@ -46,13 +47,13 @@ pub(super) fn winner<S: Simd, const N: usize>(simd: S, cells: &[Block<u16>; N], 
     let cells = cells.as_flattened();
     let before = if index > 0 { cells[index.wrapping_sub(1)] } else { u16::MAX };
     let after = if index.wrapping_add(1) < cells.len() { cells[index.wrapping_add(1)] } else { u16::MAX };
-    // Of those that are low, itself and its neighbours are no rivals.
+    // The count includes the winner and its low neighbours, which are no rivals.
     let own_count = 1 + u32::from(before <= limit) + u32::from(after <= limit);
     Pixel::new(index as u16, [before, least, after], low_count == own_count)
 }
 
-/// Copies of the right image's winners that take turns: a vector cannot be loaded before what overlaps it is
-/// stored, and the places of two pixels that follow each other are all but one the same.
+/// Copies of the right image's winners, used in turn: a vector load waits for a preceding store that overlaps it, and
+/// the places of consecutive pixels overlap in all but one.
 const TURNS: usize = 4;
 
 /// The cheapest disparities of the pixels of a row of the right image, in the mirrored order of its planes.
@@ -62,13 +63,13 @@ pub(super) struct RightWinners {
 }
 
 impl RightWinners {
-    /// Room for a mirrored row with its margins.
+    /// Buffers for a mirrored row with its margins.
     pub(super) fn new(stride: usize) -> Self {
         let rows = || std::array::from_fn(|_| Row::new(stride, 0));
         Self { least: rows(), index: rows() }
     }
 
-    /// Forgets the row before.
+    /// Resets the winners before a row.
     #[inline(always)]
     pub(super) fn clear(&mut self) {
         for least in &mut self.least {
@@ -76,7 +77,7 @@ impl RightWinners {
         }
     }
 
-    /// The sums of a left pixel whose partners begin at `at`.
+    /// Compares the sums of a left pixel, whose partners begin at `at`, with the best ones so far.
     #[inline(always)]
     pub(super) fn offer<const N: usize>(&mut self, at: usize, cells: &[Block<u16>; N]) {
         let least: &mut [Block<u16>; N] = blocks_mut(self.least[at % TURNS].values_mut(), at);
@@ -91,7 +92,7 @@ impl RightWinners {
         }
     }
 
-    /// Takes the best of all turns, once all left pixels have gone by.
+    /// Merges the copies, after all left pixels of the row.
     #[inline(always)]
     pub(super) fn settle(&mut self) {
         let ([best, least @ ..], [best_index, index @ ..]) = (&mut self.least, &mut self.index);
@@ -107,7 +108,7 @@ impl RightWinners {
         }
     }
 
-    /// After [`Self::settle`], the place among the disparities that each pixel of the mirrored row has.
+    /// Disparity index of each pixel of the mirrored row; call [`Self::settle`] first.
     #[inline(always)]
     pub(super) fn indices(&self) -> &[u16] {
         self.index[0].values()

@@ -1,7 +1,7 @@
-//! Dust in the air that takes the contrast of an image: an injected fault.
+//! Dust in the air that reduces the contrast of an image: an injected fault.
 //!
 //! ```text
-//! L(pixel) ← L̄ + (1 − s)(L(pixel) − L̄)      L̄: mean of the image; s: share of the contrast that is taken
+//! L(pixel) ← L̄ + (1 − s)(L(pixel) − L̄)      L̄: mean of the image; s: fraction of the contrast that is lost
 //! ```
 //! Source: papers.md R208 (feature starvation); the law is ours.
 
@@ -9,10 +9,10 @@ use sightline_vision::image::GrayImage;
 
 use crate::scenario::{FaultKind, Scenario};
 
-/// Share of the contrast that the dust takes.
+/// Fraction of the contrast lost to the dust.
 const TAKEN: f32 = 0.95;
 
-/// Takes the contrast of a whole picture of clean radiance where a fault of the scenario says so.
+/// Reduces the contrast of a whole image of clean radiance if the scenario has this fault at the stop.
 pub fn add_dust(radiance: &mut GrayImage, scenario: &Scenario, stop: u32) {
     if !scenario.events.has_fault(FaultKind::FeatureStarvation, stop) {
         return;

@@ -1,28 +1,28 @@
-//! From radiance to electrons, and the time for which the detector collects them.
+//! From radiance to electrons, and the exposure time.
 //!
 //! ```text
 //! rate      q(x, y) = k · F(x, y) · radiance(x, y)              electrons per second
-//! charge    S = t q · (1 + response) + s q̄(x) + d t             electrons, mean of what is counted
-//! number    DN = min(S, full well)/g + bias, at most 4095       without response: the clean picture
+//! charge    S = t q · (1 + response) + s q̄(x) + d t             electrons, mean of the count
+//! number    DN = min(S, full well)/g + bias, at most 4095       without response: the clean image
 //! ```
 //!
-//! **Fixed.** t is such that the mean of the first left picture is `mean_level` (`render.rs`).
+//! **Fixed.** t is such that the mean of the first left image is `mean_level` (`render.rs`).
 //!
-//! **Automatic** (domain.md 5.2, after the parameters of real labels): with h the number above which
-//! `pixel_fraction_percent` of the pixels lie, in the whole picture or in a square around the metered pixel (the predicted
-//! target in a drive on commands, the picture's centre elsewhere),
+//! **Automatic** (domain.md 5.2, after the parameters of real labels): with h the DN that `pixel_fraction_percent` of the
+//! pixels exceed, in the whole image or in a square around the metered pixel (the predicted target in a commanded drive,
+//! otherwise the image's centre),
 //!
 //! ```text
 //! repeat up to 6 times:  t' = t (cut − bias)/(h − bias), limited to a factor 1/8 … 8;  t' = t/4 if h saturates
 //!                        stop if |t'/t − 1| < change;  t = t' in whole units of 5.12 ms, at least one
 //! ```
 //!
-//! It starts from the exposure of the stop before, so a stop's exposure depends on the pictures before it and
-//! on nothing else. It sees the clean picture: noise and response move the number h by less than its tolerance.
+//! It starts from the exposure of the previous stop, so a stop's exposure depends on the earlier images and on nothing
+//! else. It uses the clean image: noise and response change h by less than its tolerance.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
-//! | t, s | time of exposure, `smear_s` | s |
+//! | t, s | exposure time, `smear_s` | s |
 //! | k | `electrons_per_s` | e⁻/s per unit of radiance |
 //! | F | `FlatField` | – |
 //! | q̄ | mean rate of the pixel's column over the whole height | e⁻/s |
@@ -42,27 +42,27 @@ use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::Pixel;
 use sightline_vision::image::GrayImage;
 
-/// Unit of the time of exposure, s (domain.md 5.1).
+/// Unit of the exposure time, s (domain.md 5.1).
 pub(crate) const UNIT_S: f64 = 0.00512;
 /// The longest exposure, s (domain.md 5.1).
 const LONGEST_S: f64 = 30.0;
-/// The most by which one step of the automatic exposure changes the time, as a factor (domain.md 5.2).
+/// Largest factor by which one step of the automatic exposure changes the time (domain.md 5.2).
 const LARGEST_FACTOR: f64 = 8.0;
-/// The factor where too much is saturated to tell more (domain.md 5.2).
+/// Factor on the time if h saturates (domain.md 5.2).
 const SATURATED_FACTOR: f64 = 0.25;
 
-/// The electrons that a picture, or a part of it, collects each second.
+/// The electrons per second that an image, or a part of it, collects.
 #[derive(Clone, Debug)]
 pub struct Rates {
     per_s: GrayImage,
-    /// What each column adds while the picture is moved, e⁻.
+    /// Smear charge of each column while the image is moved, e⁻.
     smear: Vec<f64>,
 }
 
 impl Rates {
-    /// Rates of a part of a picture of clean radiance; `first` is its first pixel in the whole one.
+    /// Rates of a part of an image of clean radiance; `first` is its first pixel in the whole image.
     ///
-    /// Smear is that of the rows that are given: with `smear_s` above zero, give the whole height.
+    /// Smear is computed from the given rows: with `smear_s` above zero, pass the full height.
     pub fn new(
         radiance: &GrayImage,
         scenario: &Scenario,
@@ -86,18 +86,18 @@ impl Rates {
         Self { per_s, smear }
     }
 
-    /// The electrons of each second from light, e⁻/s.
+    /// Photoelectrons per second, e⁻/s.
     pub(crate) fn per_s(&self) -> &GrayImage {
         &self.per_s
     }
 
-    /// The electrons of a pixel that do not follow its own response: smear and dark, e⁻.
+    /// The electrons of a pixel that its own response does not scale: smear and dark, e⁻.
     #[inline(always)]
     pub fn others(&self, column: usize, time_s: f64, camera: &CameraSettings) -> f64 {
         self.smear[column] + camera.dark_electrons_per_s * time_s
     }
 
-    /// The clean picture: what is recorded on average without response, fractions of full scale.
+    /// The clean image: the expected recorded value without response, fractions of full scale.
     pub fn levels(&self, time_s: f64, camera: &CameraSettings) -> GrayImage {
         let mut levels = self.per_s.clone();
         for line in levels.chunks_exact_mut(self.smear.len().max(1)) {
@@ -109,7 +109,7 @@ impl Rates {
         levels
     }
 
-    /// The clean number above which `above` pixels of a region lie, DN.
+    /// The clean DN that `above_percent` of a region's pixels exceed.
     fn high_dn(&self, region: Region, time_s: f64, camera: &CameraSettings, above_percent: f64) -> f64 {
         let rows = region.y..region.y + region.height;
         let columns = region.x..region.x + region.width;
@@ -129,29 +129,29 @@ impl Rates {
     }
 }
 
-/// The number of the 12-bit converter for a charge, not rounded, DN.
+/// Output of the 12-bit converter for a charge, not rounded, DN.
 #[inline(always)]
 fn number(electrons: f64, camera: &CameraSettings) -> f64 {
     let held = electrons.clamp(0.0, camera.full_well_electrons);
     (held / camera.gain_electrons_per_dn + camera.bias_dn).min(FULL_SCALE_DN)
 }
 
-/// The time that the automatic exposure arrives at, and how many exposures it looked at.
+/// Result of the automatic exposure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AutoExposure {
-    /// Time of exposure, whole units of 5.12 ms, s.
+    /// Exposure time, s, in whole units of 5.12 ms.
     pub time_s: f64,
-    /// Exposures that were tried.
+    /// Number of trial exposures.
     pub tried: u32,
 }
 
-/// The time of exposure of a world with fixed exposure, s.
+/// Exposure time of a world with fixed exposure, s.
 pub fn fixed_s(world: &World, scenario: &Scenario) -> f64 {
     world.exposure * FULL_SCALE_DN * scenario.camera.gain_electrons_per_dn / scenario.camera.electrons_per_s
 }
 
-/// [`fixed_s`] of a further camera: its first left picture has the mean level. `None` for a name that is none of the
-/// scenario's; meaningless soon after `cancel` is requested.
+/// [`fixed_s`] of a further camera: its first left image has the mean level. `None` if the scenario has no camera of this
+/// name; meaningless soon after `cancel` is requested.
 pub fn fixed_of_further_s(
     world: &World,
     scenario: &Scenario,
@@ -163,8 +163,8 @@ pub fn fixed_of_further_s(
     Some(fixed_s(&World { exposure, ..world.clone() }, scenario))
 }
 
-/// The automatic exposure (header) of a whole left picture, starting from `start_s`; a subframe is metered around `centre`,
-/// px, or around the picture's centre.
+/// The automatic exposure (header) of a whole left image, starting from `start_s`; a subframe is metered around `centre`,
+/// px, or around the image's centre.
 pub fn automatic(
     rates: &Rates,
     camera: &CameraSettings,
@@ -179,7 +179,7 @@ pub fn automatic(
         let factor = if high_dn >= number(f64::INFINITY, camera) {
             SATURATED_FACTOR
         } else {
-            // Darkness gives no light to measure: h = bias asks for the largest step.
+            // Darkness gives no signal: h = bias requests the largest step.
             let wanted = (auto.data_cut_dn - camera.bias_dn) / (high_dn - camera.bias_dn).max(1e-9);
             wanted.clamp(1.0 / LARGEST_FACTOR, LARGEST_FACTOR)
         };
@@ -191,7 +191,7 @@ pub fn automatic(
     AutoExposure { time_s, tried: auto.iterations }
 }
 
-/// The part of the left picture that the automatic exposure meters; near a border the subframe is moved into the picture.
+/// The part of the left image that the automatic exposure meters; near a border the subframe is moved into the image.
 fn metered(rates: &Rates, camera: &CameraSettings, centre: Option<Pixel>) -> Region {
     let [width, height] = [rates.per_s.width(), rates.per_s.height()];
     if camera.exposure != ExposureMode::Subframe {
@@ -209,7 +209,7 @@ fn metered(rates: &Rates, camera: &CameraSettings, centre: Option<Pixel>) -> Reg
     Region { x: from(centre.x, w, width), y: from(centre.y, h, height), width: w, height: h }
 }
 
-/// The nearest time that the camera can keep, s.
+/// The nearest exposure time that the camera supports, s.
 fn whole_units_s(time_s: f64) -> f64 {
     (time_s / UNIT_S).round().clamp(1.0, (LONGEST_S / UNIT_S).floor()) * UNIT_S
 }
@@ -245,14 +245,14 @@ mod tests {
         })
     }
 
-    /// The mean number of the 41 × 41 px in the middle, which show ground, DN.
+    /// Mean DN of the central 41 × 41 px, which show ground.
     fn window_dn(picture: &GrayImage) -> f64 {
         let places = (0..41 * 41).map(|k| (107 + k % 41, 107 + k / 41));
         let sum: f64 = places.map(|(x, y)| f64::from(picture.get_pixel(x, y).0[0])).sum();
         FULL_SCALE_DN * sum / 1681.0
     }
 
-    /// Mean numbers of the ground window as the sky takes more and more of the frame.
+    /// Mean DN of the ground window as the sky fills more and more of the frame.
     fn windows_dn(mode: ExposureMode) -> Vec<f64> {
         let scenario = scenario(mode);
         let of_share = |rows: u32| {
@@ -299,13 +299,13 @@ mod tests {
     #[test]
     fn a_subframe_is_metered_around_its_pixel() {
         let scenario = scenario(ExposureMode::Subframe);
-        // The left half of the picture is twice as bright as the right one.
+        // The left half of the image is twice as bright as the right one.
         let halves = GrayImage::from_fn(SIDE, SIDE, |x, _| image::Luma([if x < 128 { 0.4 } else { 0.2 }]));
         let rates = rates(&halves, &scenario);
         let time_s = |centre: Option<Pixel>| automatic(&rates, &scenario.camera, centre, 0.43).time_s;
         let [left_s, right_s] = [60.0, 200.0].map(|x| time_s(Some(Pixel::new(x, 90.0))));
         assert!((right_s / left_s - 2.0).abs() < 0.1, "{left_s} {right_s}");
-        // The middle square reaches into both halves: its brightest hundredth is on the left.
+        // The central square extends into both halves: its brightest hundredth is on the left.
         assert!((time_s(None) / left_s - 1.0).abs() < 0.05);
         // A pixel beyond the border meters the square at the border.
         assert_eq!(time_s(Some(Pixel::new(900.0, -50.0))), right_s);
@@ -321,7 +321,7 @@ mod tests {
         // 600 000 e⁻/s · 0.2 · 0.512 s / 42 = 1462.9 DN above the bias; the cut is 1980 above it.
         let found = automatic(&even, &scenario.camera, None, 0.512);
         assert_eq!(found.time_s, (100.0 * 1980.0 / (120_000.0 * 0.512 / 42.0_f64)).round() * UNIT_S);
-        // At 10 s everything is saturated: a quarter; 1 unit shows next to nothing: eight times as long.
+        // At 10 s everything is saturated: a quarter; 1 unit gives almost no signal: eight times as long.
         assert!((automatic(&even, &scenario.camera, None, 10.24).time_s - 2.56).abs() < 1e-9);
         assert!((automatic(&even, &scenario.camera, None, UNIT_S).time_s - 8.0 * UNIT_S).abs() < 1e-9);
     }

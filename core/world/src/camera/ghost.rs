@@ -1,9 +1,9 @@
-//! Reflections in the lenses of a pair: light that is added to the radiance where a patch fixed to the rover would be seen.
+//! Reflections in the lenses of a pair: radiance added where a virtual patch fixed to the rover would be seen.
 //!
 //! ```text
 //! L(pixel) ← L(pixel) + brightness · L̄ · n(y, z)      n: blotches, 0 to 1, of the patch at x = at_m[0]
 //! ```
-//! Both eyes show the same blotches, displaced as by a surface at that distance, so that stereo finds it there.
+//! Both cameras show the same blotches with the disparity of a surface at that distance, so that stereo finds one there.
 //!
 //! Frame: rover, m. Source: ours, for driving.md 3, incident 10.
 
@@ -14,10 +14,10 @@ use sightline_vision::image::GrayImage;
 use crate::ground::texture::mix;
 use crate::scenario::{Ghost, Scenario};
 
-/// Distance of the blotches' grid points, m.
+/// Spacing of the blotches' lattice points, m.
 const BLOTCH_M: f64 = 0.03;
 
-/// Adds the reflections that a further camera shows at a stop to its whole clean radiance.
+/// Adds the reflections of a further camera at a stop to the clean radiance of its whole image.
 pub fn add_ghosts(
     radiance: &mut GrayImage,
     scenario: &Scenario,

@@ -1,4 +1,4 @@
-//! The cameras that see it: which pair, samples of a pixel's area, the optics, the exposure, the detector.
+//! The cameras: the pairs, samples of a pixel's area, the optics, the exposure, the detector.
 
 pub(crate) mod picture;
 pub mod rig;

@@ -1,4 +1,4 @@
-//! The detector: from the electrons of a picture to its recorded numbers.
+//! The detector: from the electrons of an image to its recorded numbers.
 //!
 //! ```text
 //! S   = light · (1 + response) + smear + dark                     electrons (`exposure.rs`)
@@ -11,13 +11,13 @@
 //! The last line's inverse keeps the recorded value linear in the light, as ground products do (ILF): shot
 //! noise then has about the same width in DN8 everywhere, and steps of the value grow with the light.
 //!
-//! `response` is a pixel's own deviation, Gaussian and fixed for each camera of a scenario; the scene moves
-//! over it from stop to stop. It follows the scenario's seed; shot and read noise follow `noise_seed`.
+//! `response` is a pixel's own deviation, Gaussian and fixed for each camera of a scenario, while the scene moves over it
+//! from stop to stop. It follows the scenario's seed; shot and read noise follow `noise_seed`.
 //! Var(DN) = S/g² + (σ_read/g)² + 1/12 for a fixed scene without `response`, so the slope of the variance over
 //! the mean is 1/g.
 //!
-//! Each pixel has its own stream of random numbers, started from (seed, step, eye, place), so that the noise
-//! of a region equals that of the whole picture, whatever the number of threads.
+//! Each pixel has its own random stream, seeded by (seed, step, eye, position), so that the noise of a region equals that
+//! of the whole image for any number of threads.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -41,11 +41,10 @@ use crate::camera::picture::NoiseSeed;
 use crate::ground::texture::mix;
 use crate::scenario::{CameraSettings, FULL_SCALE_DN, Quantisation, Scenario};
 
-/// The largest number of 8 bits.
+/// Largest output of the 8-bit conversion.
 const BYTE_DN: f64 = 255.0;
 
-/// Records what a picture collects in `time_s`; `first` is its first pixel in the whole picture. Fails soon after `cancel`
-/// is requested.
+/// Records what an image collects in `time_s`; `first` is its first pixel in the whole image. Cancellable.
 pub(crate) fn record(
     rates: &Rates,
     scenario: &Scenario,
@@ -75,7 +74,7 @@ pub(crate) fn record(
     Ok(recorded)
 }
 
-/// The stream of random numbers of one pixel.
+/// The random stream of one pixel.
 fn stream(key: u64, place: u64) -> Pcg32 {
     let state = mix(key ^ mix(place));
     Pcg32::new(state, mix(state))
@@ -85,14 +84,14 @@ fn normal(random: &mut Pcg32) -> f64 {
     StandardNormal.sample(random)
 }
 
-/// The whole number of the 12-bit converter for a mean charge, DN.
+/// Rounded output of the 12-bit converter for a mean charge, DN.
 fn converted(electrons: f64, camera: &CameraSettings, random: &mut Pcg32) -> f64 {
     let counted = Poisson::new(electrons).map_or(0.0, |poisson| poisson.sample(random));
     let read = counted.min(camera.full_well_electrons) + camera.read_noise_electrons * normal(random);
     (read / camera.gain_electrons_per_dn + camera.bias_dn).round().clamp(0.0, FULL_SCALE_DN)
 }
 
-/// The recorded value of a number of the 12-bit converter, fraction of full scale.
+/// The recorded value for a 12-bit DN, fraction of full scale.
 fn quantised(dn: f64, camera: &CameraSettings) -> f32 {
     let level = dn / FULL_SCALE_DN;
     let value = match (camera.bit_depth, camera.quantisation) {

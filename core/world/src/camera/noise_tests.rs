@@ -1,4 +1,4 @@
-//! The detector has the noise of its gain, the steps of its converter and a response that stays.
+//! The detector has the noise of its gain, the steps of its converter and a constant response.
 
 use super::*;
 use crate::camera::exposure::Rates;
@@ -14,7 +14,7 @@ fn scenario() -> Scenario {
     scenario
 }
 
-/// What is recorded of an even light that fills `level` of full scale in 1 s.
+/// The recorded image of uniform light that fills `level` of full scale in 1 s.
 fn recorded_of(level: f64, scenario: &Scenario, seed: NoiseSeed) -> GrayImage {
     let camera = &scenario.camera;
     let electrons = camera.gain_electrons_per_dn * (FULL_SCALE_DN * level - camera.bias_dn);
@@ -62,7 +62,7 @@ fn the_line_of_variance_over_mean_gives_the_gain_and_the_read_noise_back() {
         let slope = points.iter().map(|(m, v)| (m - mean) * (v - variance)).sum::<f64>()
             / points.iter().map(|(m, _)| (m - mean).powi(2)).sum::<f64>();
         assert!((1.0 / slope / gain - 1.0).abs() < 0.02, "{gain}: {}", 1.0 / slope);
-        // Twelve levels with 65 536 pixels each know every variance to 0.6 %.
+        // Twelve levels with 65 536 pixels each determine every variance to 0.6 %.
         for (mean_dn, variance) in points {
             let expected = (mean_dn - 20.0) / gain + (read / gain).powi(2) + 1.0 / 12.0;
             assert!((variance / expected - 1.0).abs() < 0.03, "{variance} {expected}");
@@ -111,13 +111,13 @@ fn the_square_root_table_stays_linear_with_steps_that_grow_with_the_light() {
     let mut codes = std::collections::BTreeSet::new();
     for dn in 0..4096 {
         let (dn, value) = (f64::from(dn), value_dn(f64::from(dn)));
-        // Half a step of 1/255 in the root, and half a number from writing the inverse as a whole one.
+        // Half a step of 1/255 in the root, and half a DN from rounding the inverse.
         let half_step =
             (dn / FULL_SCALE_DN).sqrt() * FULL_SCALE_DN / 255.0 + FULL_SCALE_DN / 4.0 / 255f64.powi(2);
         assert!((value - dn).abs() <= half_step + 0.5 + 1e-3, "{dn} {value}");
         codes.insert(value.round() as i64);
     }
-    // 256 codes, of which the lowest meet in one number.
+    // 256 codes, of which the lowest map to one DN.
     assert!((250..=256).contains(&codes.len()), "{}", codes.len());
     // 4095 (64/255)² and its neighbours: 257.95, 266.08.
     assert!((value_dn(258.0) - 258.0).abs() < 1e-3 && (value_dn(266.0) - 266.0).abs() < 1e-3);

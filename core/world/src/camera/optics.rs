@@ -6,20 +6,19 @@
 //! pattern         p = Σ c_k b_k(u, w),   b = √3 u, √3 w, 3 u w, √5 (3u² − 1)/2, √5 (3w² − 1)/2
 //! ```
 //!
-//! The Gaussian is taken at whole pixels, so its variance falls short of σ²: by 14 % at 0.5 px, 2.3 % at 0.6 px,
-//! 0.2 % at 0.7 px. The point spread belongs to the clean radiance; the flat field multiplies it when the
-//! picture is developed.
-//! The functions b are orthonormal over the picture and Σ c² = 1, so ρ is the rms of the pattern; c is drawn
-//! once for each camera of a scenario. ψ is the angle θ between the pixel's ray and A: A and not O, which in
-//! a label may lie degrees from the lens's own axis (domain.md 2.6). A CAHVORE lens maps θ to tan(Lθ)/L, so
-//! within it the ray leans by about Lθ: ψ = Lθ there (ours; L = 1 gives cos⁴θ, and a hazcam's corner keeps
-//! half of its light instead of none).
+//! The Gaussian is sampled at whole pixels, so its variance falls short of σ²: by 14 % at 0.5 px, 2.3 % at 0.6 px, 0.2 %
+//! at 0.7 px. The point spread is part of the clean radiance; the flat field multiplies it during development. The
+//! functions b are orthonormal over the image and Σ c² = 1, so ρ is the rms of the pattern; c is drawn once for each
+//! camera of a scenario. ψ is the angle θ between the pixel's ray and A. A is used instead of O, which in a label may be
+//! degrees away from the lens's own axis (domain.md 2.6). A CAHVORE lens maps θ to tan(Lθ)/L, so inside it the ray makes
+//! an angle of about Lθ: ψ = Lθ there (ours; L = 1 gives cos⁴θ, and a hazcam's corner keeps half of its light instead of
+//! none).
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
 //! | v | `vignetting` | – |
 //! | ρ | `flat_field_residue` | – |
-//! | u, w | place in the picture, −1 to 1 along x and y | – |
+//! | u, w | position in the image, −1 to 1 along x and y | – |
 //! | ψ, θ | angles off the axis | rad |
 //! | L | linearity of a CAHVORE lens | – |
 //!
@@ -36,7 +35,7 @@ use sightline_geometry::camera::{Camera, CameraModel, Imaging};
 use sightline_geometry::frames::Pixel;
 use sightline_vision::image::GrayImage;
 
-/// The part of the light that each pixel of a camera gets.
+/// Relative sensitivity of each pixel of a camera.
 #[derive(Clone, Debug)]
 pub(crate) struct FlatField<'a> {
     camera: &'a Camera,
@@ -46,7 +45,7 @@ pub(crate) struct FlatField<'a> {
 }
 
 impl<'a> FlatField<'a> {
-    /// The flat field of one eye of a scenario; the frame of the camera does not matter.
+    /// The flat field of one camera of a scenario; the frame of the camera model does not matter.
     pub(crate) fn new(scenario: &Scenario, camera: &'a Camera, eye: Eye) -> Self {
         let key = mix(scenario.seed ^ mix(0xf1a7_0000 + eye.number()));
         let mut random = Pcg64::new(u128::from(key), 0xf1a7_f1e1_d000);
@@ -60,7 +59,7 @@ impl<'a> FlatField<'a> {
         }
     }
 
-    /// The part of the light that a pixel gets; about 1 in the middle.
+    /// Relative sensitivity of a pixel; about 1 at the image's centre.
     pub(crate) fn at(&self, x: u32, y: u32) -> f64 {
         let place = |at: u32, side: u32| (2.0 * f64::from(at) + 1.0) / f64::from(side.max(1)) - 1.0;
         let (u, w) = (place(x, self.camera.width()), place(y, self.camera.height()));
@@ -93,7 +92,7 @@ impl<'a> FlatField<'a> {
         }
     }
 
-    /// Multiplies a part of a picture, whose first pixel is `first` of the whole one.
+    /// Multiplies a part of an image whose first pixel is `first` in the whole image.
     pub(crate) fn apply(&self, picture: &mut GrayImage, first: [u32; 2]) {
         let width = picture.width().max(1) as usize;
         picture.par_chunks_mut(width).enumerate().for_each(|(y, line)| {
@@ -104,7 +103,7 @@ impl<'a> FlatField<'a> {
     }
 }
 
-/// A Gaussian of σ `sigma_px`, cut at 4σ, with the sum 1.
+/// A Gaussian of σ `sigma_px`, cut at 4σ, with sum 1.
 pub(crate) fn gaussian(sigma_px: f64) -> Vec<f32> {
     let reach = (4.0 * sigma_px).ceil() as i32;
     let value = |k: i32| if sigma_px > 0.0 { (-0.5 * (f64::from(k) / sigma_px).powi(2)).exp() } else { 1.0 };
@@ -154,7 +153,7 @@ mod tests {
     fn a_corner_of_a_linear_camera_gets_cos_to_the_fourth() {
         let whole = scenario(CameraRig::Table1Navcam, 1.0, 0.0);
         let camera = left(&whole);
-        // The first pixel's centre lies 63.5 and 47.5 px from the middle, with 160 px per unit of tangent.
+        // The first pixel's centre is 63.5 and 47.5 px from the image's centre, with 160 px per unit of tangent.
         let cos_squared = 1.0 / (1.0 + (63.5f64.powi(2) + 47.5f64.powi(2)) / 160f64.powi(2));
         let corner = FlatField::new(&whole, &camera, Eye::Left).at(0, 0);
         assert!((corner - cos_squared.powi(2)).abs() < 1e-9, "{corner}");
@@ -168,7 +167,7 @@ mod tests {
         let scenario = scenario(CameraRig::MerFrontHazcam, 1.0, 0.0);
         let camera = left(&scenario);
         let corner = FlatField::new(&scenario, &camera, Eye::Left).at(0, 0);
-        // The corner lies 88° off the axis (domain.md 2.6): cos⁴(0.37 · 88°) = 0.50.
+        // The corner is 88° off the axis (domain.md 2.6): cos⁴(0.37 · 88°) = 0.50.
         assert!((corner - 0.50).abs() < 0.02, "{corner}");
     }
 
@@ -199,7 +198,7 @@ mod tests {
                 terms.map(|(k, weight)| f64::from(*weight) * (k as f64 - middle).powi(power)).sum()
             };
             assert!((moment(0) - 1.0).abs() < 1e-6);
-            // What sampling at whole pixels leaves of the variance (header).
+            // Fraction of the variance that sampling at whole pixels leaves (header).
             let part = if sigma_px == 0.5 {
                 0.860
             } else if sigma_px == 0.7 {

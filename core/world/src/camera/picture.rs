@@ -1,8 +1,8 @@
-//! Which picture is meant: the camera of the pair, the part of its picture, the seed of its noise.
+//! Identifies an image: the camera of the pair, the region, the seed of its noise.
 
 use sightline_geometry::camera::Camera;
 
-/// Which camera of the pair.
+/// A camera of a stereo pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Eye {
     /// The left camera.
@@ -12,7 +12,7 @@ pub enum Eye {
 }
 
 impl Eye {
-    /// The number that stands for it in seeds.
+    /// The camera's number in seeds.
     pub(crate) fn number(self) -> u64 {
         match self {
             Self::Left => 1,
@@ -21,16 +21,16 @@ impl Eye {
     }
 }
 
-/// Whose noise it is: two pictures with the same seed have the same noise.
+/// Seed of the noise: two images with the same seed have the same noise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct NoiseSeed {
-    /// The stop, or any other number that tells one exposure from the next.
+    /// The stop, or any other number that distinguishes exposures.
     pub step: u32,
     /// The camera, which has its own pixel response.
     pub eye: Eye,
 }
 
-/// A rectangle of a picture, px.
+/// A rectangle of an image, px.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Region {
     /// First column.
@@ -44,7 +44,7 @@ pub struct Region {
 }
 
 impl Region {
-    /// The whole picture of a camera.
+    /// The whole image of a camera.
     pub fn whole(camera: &Camera) -> Self {
         Self { x: 0, y: 0, width: camera.width(), height: camera.height() }
     }

@@ -1,7 +1,7 @@
-//! Rays within the pixels of a tile, from those of the camera model through the pixels' corners.
+//! Rays within the pixels of a tile, interpolated from the camera model's rays through the pixels' corners.
 //!
-//! The rays of a pixel are joined bilinearly from those of its corners on the plane d·A = 1, where a linear camera's rays lie
-//! evenly, and made unit. What distortion bends within one pixel is lost: less than 5e-5 px (tested).
+//! The rays of a pixel are interpolated bilinearly between those of its corners on the plane d·A = 1, where the rays of a
+//! linear camera are evenly spaced, and normalised. The neglected distortion within one pixel is below 5e-5 px (tested).
 //!
 //! Frame: site. Sources: domain.md 11.3.
 
@@ -16,11 +16,11 @@ use crate::ground::texture::LANES;
 pub(super) struct Corners {
     pub(super) width: usize,
     pub(super) rays: Vec<Option<Ray>>,
-    /// The same with their directions drawn out to the plane d·A = 1.
+    /// The same with their directions scaled to the plane d·A = 1.
     on_image_plane: Vec<Ray>,
 }
 
-/// Neighbouring pixels of a tile: the first, columns and rows.
+/// Neighbouring pixels of a tile: the first pixel, and the number of columns and rows.
 pub(super) struct Block {
     pub(super) first: [usize; 2],
     pub(super) size: [usize; 2],
@@ -36,7 +36,7 @@ impl Block {
 }
 
 impl Corners {
-    /// Of the tile whose first pixel is at `first`, through a camera with this axis.
+    /// For the tile whose first pixel is at `first`, through a camera with this axis.
     pub(super) fn new(
         camera: &Camera,
         axis: &Vector3,
@@ -56,7 +56,7 @@ impl Corners {
         Self { width, rays, on_image_plane }
     }
 
-    /// The cone around the corners of a block's pixels; none where the camera model gives no ray through one.
+    /// The cone around the corners of a block's pixels; `None` if the camera model has no ray through one.
     #[inline(always)]
     pub(super) fn cone(&self, block: &Block) -> Option<Cone> {
         let [x, y] = block.first;
@@ -77,13 +77,13 @@ impl Corners {
     }
 }
 
-/// The ray with its direction drawn out to the plane d·A = 1; near and beyond 90°, to some other length.
+/// The ray with its direction scaled to the plane d·A = 1; near and beyond 90°, to another length.
 fn on_image_plane(ray: &Ray, axis: &Vector3) -> Ray {
     Ray { origin: ray.origin, direction: ray.direction / ray.direction.dot(axis).max(0.1) }
 }
 
-/// The rays at the positions `offsets` (u, v) of each pixel, [`LANES`] / `PIXELS` at most, interpolated between the rays of the pixel's
-/// corners (0,0), (1,0), (0,1), (1,1).
+/// The rays at the positions `offsets` (u, v) of each pixel, at most [`LANES`] / `PIXELS`, interpolated between the rays
+/// of the pixel's corners (0,0), (1,0), (0,1), (1,1).
 #[inline(always)]
 pub(super) fn between<const PIXELS: usize>(corners: &[[Ray; 4]; PIXELS], offsets: &[[f64; 2]]) -> RayLanes {
     let lanes = LANES / PIXELS;

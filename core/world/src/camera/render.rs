@@ -1,23 +1,23 @@
-//! Rendering: from a camera in the site to the picture that it takes, in two halves.
+//! Rendering: from a camera in the site frame to its image, in two stages.
 //!
 //! **Clean radiance** ([`clean_radiance`]) follows from world, light and camera model alone:
 //!
-//! 1. `sampling.rs` averages the radiance over each pixel's area, for the pixels asked for and a margin.
-//! 2. The optics blur it (`optics.rs`; the margin is as wide as the kernel, so a region of a picture has the
-//!    same bits as the whole picture has there).
+//! 1. `sampling.rs` averages the radiance over each pixel's area, for the requested pixels and a margin.
+//! 2. The optics blur it (`optics.rs`; the margin is as wide as the kernel, so a region of an image has the
+//!    same bits as the whole image has there).
 //!
-//! **Development** ([`develop`]) makes the picture of it and renders nothing, so that exposure, detector and
-//! noise can be changed, or noise drawn again, on radiance that was kept:
+//! **Development** ([`develop`]) turns it into an image without rendering, so that exposure, detector and noise can be
+//! changed, or noise redrawn, on stored radiance:
 //!
-//! 3. Flat field, time of exposure, smear and dark give electrons (`exposure.rs`).
+//! 3. Flat field, exposure time, smear and dark current give electrons (`exposure.rs`).
 //! 4. Response, noise, converter and quantisation give the recorded numbers (`noise.rs`).
 //!
-//! Without 4 it is the *clean* picture ([`Rates::levels`]): the expectation of the recorded one without
-//! response, in fractions of full scale.
+//! Steps 1 to 3 give the *clean* image ([`Rates::levels`]): the expectation of the recorded one without response, in
+//! fractions of full scale.
 //!
-//! The fixed exposure is such that the mean of the first left picture is `mean_level`, taken on 64 rays along
-//! each side. Rows of tiles are shared between threads; every pixel is a function of its place alone, so the
-//! bits do not depend on the number of threads.
+//! The fixed exposure is such that the mean of the first left image is `mean_level`, measured with 64 rays along each
+//! side. Rows of tiles are shared between threads; every pixel is a function of its position alone, so the bits do not
+//! depend on the number of threads.
 //!
 //! Units: radiance as in `light/reflection.rs`; levels are fractions of full scale (4095 DN); time in s.
 //! Frame: the camera is given in the site frame. Sources: domain.md 11.3.
@@ -42,7 +42,7 @@ use crate::rover::drive;
 use crate::scenario::{FULL_SCALE_DN, Scenario};
 use crate::world::World;
 
-/// The picture that a camera takes under the fixed exposure, with noise and quantisation.
+/// Renders the image of a camera under the fixed exposure, with noise and quantisation.
 pub fn render(world: &World, scenario: &Scenario, camera_in_site: &Camera, seed: NoiseSeed) -> GrayImage {
     let never = AtomicBool::new(false);
     let whole = Region::whole(camera_in_site);
@@ -51,9 +51,9 @@ pub fn render(world: &World, scenario: &Scenario, camera_in_site: &Camera, seed:
     develop(&radiance, scenario, camera_in_site, fixed_s(world, scenario), seed)
 }
 
-/// The recorded picture of a whole picture of clean radiance; renders nothing.
+/// Develops the recorded image from a whole image of clean radiance, without rendering.
 ///
-/// `camera` is the one that the radiance was rendered for, in any frame; `time_s` the time of exposure, s.
+/// `camera` is the one that the radiance was rendered for, in any frame; `time_s` is the exposure time, s.
 pub fn develop(
     radiance: &GrayImage,
     scenario: &Scenario,
@@ -64,7 +64,7 @@ pub fn develop(
     develop_until(radiance, scenario, camera, time_s, seed, Cancel::default()).unwrap_or_default()
 }
 
-/// [`develop`], which ends soon after `cancel` is requested.
+/// [`develop`], cancellable.
 ///
 /// # Errors
 /// [`Error::Cancelled`] soon after `cancel` is requested.
@@ -81,8 +81,7 @@ pub fn develop_until(
     noise::record(&rates, scenario, time_s, seed, [0, 0], cancel)
 }
 
-/// Radiance behind the optics of a part of a picture, before exposure and detector; stops soon after `cancel`
-/// is set.
+/// Radiance behind the optics in a region of an image, before exposure and detector; stops soon after `cancel` is set.
 ///
 /// # Errors
 /// [`Error::Cancelled`].
@@ -118,16 +117,16 @@ pub fn clean_radiance(
     Ok(GrayImage::from_raw(region.width, region.height, blurred).unwrap_or_default())
 }
 
-/// Fraction of full scale per unit of radiance that gives the first left picture its mean level.
+/// Fraction of full scale per unit of radiance that gives the first left image its mean level.
 ///
 /// Returns 1 soon after `cancel` is requested.
 pub(crate) fn exposure(world: &World, scenario: &Scenario, cancel: Cancel<'_>) -> f64 {
     exposure_of(world, scenario, &Rig::new(&scenario.camera), cancel)
 }
 
-/// [`exposure`] for the pictures of any rig, which is mounted beside the main pair.
+/// [`exposure`] for the images of any rig mounted beside the main pair.
 pub(crate) fn exposure_of(world: &World, scenario: &Scenario, rig: &Rig, cancel: Cancel<'_>) -> f64 {
-    /// Rays along each side of the picture.
+    /// Rays along each side of the image.
     const SIDE: u32 = 64;
     let Ok(stop) = drive::first_stop(world, scenario, cancel) else { return 1.0 };
     let camera = rig.cameras_in_rover(stop.angles).0.moved(&stop.site_from_rover);
@@ -150,7 +149,7 @@ pub(crate) fn exposure_of(world: &World, scenario: &Scenario, rig: &Rig, cancel:
     if mean > 0.0 { level / mean } else { 1.0 }
 }
 
-/// Where a point of the site appears in a camera, if it is in the picture and nothing hides it.
+/// Projects a point in the site frame into a camera; `None` if it is outside the image or occluded.
 pub fn visible_pixel(
     world: &World,
     camera_in_site: &Camera,

@@ -1,22 +1,22 @@
-//! The pairs of cameras that a scenario can have, on the mast's head or on the body.
+//! The camera pairs available to a scenario, on the mast's head or on the body.
 //!
-//! | rig | left eye | right eye | head or body |
+//! | rig | left camera | right camera | head or body |
 //! |---|---|---|---|
 //! | `mer_navcam` | Spirit, label | Spirit, label | Spirit's mast |
 //! | `mer_pancam` | Opportunity: C, A, scale | ours | Opportunity's mast |
 //! | `mer_front_hazcam` | Opportunity, label (TV2) | ours: the left one 0.10 m along H' | body |
-//! | `mer_rear_hazcam` | ours: the front one turned by 180° about z | the front one, turned | body |
+//! | `mer_rear_hazcam` | ours: the front one rotated by 180° about z | the front one, rotated | body |
 //! | `table1_pancam`, `table1_navcam` | ours: ideal, f/pixel | ours | Spirit's mast |
 //!
-//! **Pancam.** Known of the left eye are C and A in the head frame and the effective scale at the centre; its
-//! O, R and the direction of V are not, so it is linear here: `H = f_x h + c_x A`, `V = f_y v + c_y A` with h
-//! level (h ∝ z × A) and v = A × h. The right eye is the left one carried by a rigid motion that makes the
-//! axes mirror images: the pair looks along m, from which A is turned inwards by the toe-in of 1°; the right
-//! eye is turned by −2° about z and stands 0.30 m along n = z × m.
+//! **Pancam.** For the left camera C and A in the head frame and the effective scale at the centre are known; its O, R and
+//! the direction of V are not, so it is linear here: `H = f_x h + c_x A`, `V = f_y v + c_y A` with h level (h ∝ z × A) and
+//! v = A × h. The right camera is the left one moved by a rigid transform that makes the axes mirror images: the mean
+//! viewing direction is m, from which A is rotated inwards by the toe-in of 1°; the right camera is rotated by −2° about z
+//! and placed 0.30 m along n = z × m.
 //!
-//! **Table I.** 4.8 mm over 1024 px is 4.6875 µm a pixel: f = 16 mm is 3413.3 px, f = 6 mm is 1280 px. The
-//! axes are parallel to the head's x; the centres lie 0.15 m above the mast's origin like the rover's own
-//! cameras and half the baseline to each side.
+//! **Table I.** 4.8 mm over 1024 px is 4.6875 µm a pixel: f = 16 mm is 3413.3 px, f = 6 mm is 1280 px. The axes are
+//! parallel to the head's x; the centres are 0.15 m above the mast's origin, like the rover's own cameras, and half the
+//! baseline to each side.
 //!
 //! A smaller image is the block average of the full one (domain.md 2.1): all widths are 1024 px over a power
 //! of two, and heights follow.
@@ -25,7 +25,7 @@
 //! |---|---|---|
 //! | C, A, H, V | `Cahv` | m, –, px, px; head or rover |
 //! | f, c | focal length, principal point | px |
-//! | m, n | middle direction, direction of the baseline | –, head |
+//! | m, n | mean viewing direction, direction of the baseline | –, head |
 //!
 //! Sources: domain.md 2.6, 4.1, 4.3, 5.1 and 15 (TV2); papers.md R25, R42.
 
@@ -38,14 +38,14 @@ use sightline_geometry::frames::{Point3, Pose, Vector3};
 
 /// Baseline of the pancams, m (domain.md 5.1).
 const PANCAM_BASELINE_M: f64 = 0.30;
-/// Angle by which each pancam looks inwards, deg (domain.md 5.1; that it is each eye's is ours).
+/// Angle by which each pancam is turned inwards, deg (domain.md 5.1; that it applies to each camera is ours).
 const PANCAM_TOE_IN_DEG: f64 = 1.0;
 /// Side of a pixel of the 1/3-inch detector of R42: 4.8 mm over 1024 px, m.
 const TABLE1_PIXEL_M: f64 = 4.8e-3 / 1024.0;
 /// Height of the cameras above the mast's origin, m (domain.md 4.1).
 const HEAD_HEIGHT_M: f64 = 0.15;
 
-/// A pair of cameras where it is mounted.
+/// A mounted pair of cameras.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Rig {
     /// On the head of a pan and tilt mast.
@@ -98,7 +98,7 @@ impl Rig {
         }
     }
 
-    /// The left and the right camera in the rover frame; without angles a mast looks level and ahead.
+    /// The left and the right camera in the rover frame; without angles a mast points level and ahead.
     pub fn cameras_in_rover(&self, angles: Option<MastAngles>) -> (Camera, Camera) {
         let ahead = MastAngles { azimuth_rad: 0.0, elevation_rad: 0.0 };
         match self {
@@ -107,11 +107,11 @@ impl Rig {
         }
     }
 
-    /// The angles that put a point (rover frame, m) on the centre of the left image; `None` on the body,
-    /// where nothing can be pointed.
+    /// The mast angles that project a point (rover frame, m) onto the centre of the left image; `None` for a rig on the
+    /// body, which cannot be pointed.
     ///
     /// # Errors
-    /// A point that the mast cannot look at.
+    /// A point that the mast cannot be pointed at.
     pub fn point_at(&self, target_in_rover: &Point3) -> Result<Option<MastAngles>> {
         match self {
             Self::Body { .. } => Ok(None),
@@ -282,8 +282,8 @@ mod tests {
 
     #[test]
     fn every_pixel_of_the_hazcams_and_of_the_blurs_reach_has_a_ray() {
-        // Corners of pixels two (at 128 px) and three (at 1024 px) beyond the picture: what a blur of 0.6 px
-        // brings in from farther away is below 1e-5.
+        // Corners of pixels two (at 128 px) and three (at 1024 px) beyond the image: a blur of 0.6 px takes less than 1e-5
+        // from farther away.
         for (size, margin) in [(128, 2.5), (1024, 3.5)] {
             let (left, right) = rig(CameraRig::MerFrontHazcam, size).cameras_in_rover(None);
             let ends = [-margin, f64::from(size) - 1.0 + margin];

@@ -1,17 +1,17 @@
-//! Sampling: rays through the pixels of a tile, and the surface that each meets; its light follows in `shading.rs`.
+//! Sampling: rays through the pixels of a tile, and the surface that each ray meets; `shading.rs` computes the radiance.
 //!
-//! A pixel is the mean over its area, taken at n × n samples on a fixed grid, turned a little: sample (i, j)
-//! lies at x = (i + (j + ½)/n)/n, y = (j + 1 − (i + ½)/n)/n of the pixel. All n² columns and rows are
-//! distinct, and x and y are uncorrelated, so the pixel is no wider along one diagonal than along the other.
-//! Rays at the corners of pixels come from the true camera model, those between follow from them (`pixel_rays.rs`).
+//! A pixel is the mean over its area, sampled at n × n positions of a slightly rotated grid: sample (i, j) is at x = (i +
+//! (j + ½)/n)/n, y = (j + 1 − (i + ½)/n)/n of the pixel. All n² columns and rows are distinct, and x and y are
+//! uncorrelated, so the pixel is no wider along one diagonal than along the other. Rays at the corners of pixels come from
+//! the true camera model, those between are interpolated (`pixel_rays.rs`).
 //!
-//! Texture that the samples cannot carry is left out: with the footprint p = distance · rad per pixel, an
-//! octave shorter than c = max(2p/n, 2p/(n² μ)) gets no weight (μ is the cosine of emission: on ground seen
-//! at a grazing angle the pixel is long, but all n² rows of samples lie along its length).
+//! Texture that the samples cannot resolve is left out: with the footprint p = distance · rad per pixel, an octave shorter
+//! than c = max(2p/n, 2p/(n² μ)) gets no weight (μ is the cosine of emission: on ground seen at a grazing angle the pixel
+//! is long, but all n² rows of samples are spread along its length).
 //!
-//! Tiles list the rocks that their cone of rays can meet, the nearest first (`culling.rs`). [`LANES`] rays are cast at once: those
-//! of one pixel, or of a block of neighbouring pixels that have fewer. Every sample is a function of its own pixel alone, so
-//! neither tiles, blocks nor threads show in the picture.
+//! Tiles list the rocks that their cone of rays can meet, the nearest first (`culling.rs`). [`LANES`] rays are cast at
+//! once: those of one pixel, or of a block of neighbouring pixels with fewer samples. Every sample is a function of its
+//! own pixel alone, so the image does not depend on tiles, blocks or threads.
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
@@ -37,7 +37,7 @@ use crate::world::World;
 /// Side of a tile, px.
 pub(crate) const TILE_PX: usize = 16;
 
-/// The picture to sample: a rectangle of pixels of a camera.
+/// The image to sample: a camera, and the positions of the samples within a pixel.
 pub(crate) struct Sampler<'a> {
     world: &'a World,
     camera: &'a Camera,
@@ -46,12 +46,12 @@ pub(crate) struct Sampler<'a> {
     offsets: Vec<[f64; 2]>,
     rad_per_px: f64,
     axis: Vector3,
-    /// Of the ground, site frame.
+    /// Unit normal of the mean ground, site frame.
     mean_normal: Vector3,
 }
 
 impl<'a> Sampler<'a> {
-    /// Prepares to sample the pictures of a camera that stands in the site.
+    /// Prepares to sample images of a camera in the site frame.
     pub(crate) fn new(world: &'a World, camera_in_site: &'a Camera, samples_per_axis: u32) -> Self {
         let n = samples_per_axis.max(1) as usize;
         let middle = camera_in_site.centre_pixel();
@@ -86,7 +86,7 @@ impl<'a> Sampler<'a> {
         of_pixels.map(|samples| samples.iter().sum::<f32>() / count as f32).collect()
     }
 
-    /// The rocks that any ray of the tile can meet, the nearest first, with their least distance, m.
+    /// The rocks that any ray of the tile can meet, the nearest first, with their smallest distance, m.
     fn rocks_in_view(&self, corners: &Corners, height: usize) -> Vec<(f64, usize)> {
         // A tile's edge can bulge beyond its corners by far less than this margin of one pixel.
         let margin_rad = self.rad_per_px * if corners.width.max(height) > 1 { 1.0 } else { 2.0 };
@@ -103,7 +103,7 @@ impl<'a> Sampler<'a> {
         list
     }
 
-    /// Notes what the samples of a tile meet, in square blocks of `PIXELS` pixels.
+    /// Records the hits of a tile's samples, in square blocks of `PIXELS` pixels.
     #[inline(always)]
     fn blocks<const PIXELS: usize>(
         &self,
@@ -127,8 +127,8 @@ impl<'a> Sampler<'a> {
         }
     }
 
-    /// Notes what the samples of a block of `PIXELS` pixels at most meet; false, and nothing noted, where the camera model gives
-    /// no ray or where the rays of several pixels lie too far apart on the ground to be cast at once.
+    /// Records the hits of the samples of a block of at most `PIXELS` pixels. Returns false, without recording, if the
+    /// camera model has no ray or if the rays of several pixels are too far apart on the ground to be cast at once.
     #[inline(always)]
     fn block<const PIXELS: usize>(
         &self,
@@ -148,7 +148,7 @@ impl<'a> Sampler<'a> {
         };
         seen.rocks_in_view.clear();
         seen.rocks_in_view.extend(rocks.iter().filter(meets));
-        // A block with fewer pixels repeats its first.
+        // A block with fewer pixels repeats its first pixel.
         let mut of_pixels = [corners.of_pixel(block.first); PIXELS];
         for (rays, pixel) in of_pixels.iter_mut().zip(block.pixels()).skip(1) {
             *rays = corners.of_pixel(pixel);
@@ -170,7 +170,7 @@ impl<'a> Sampler<'a> {
         true
     }
 
-    /// The nearest rock and its plane on each ray, with its distance, m, infinite where there is none.
+    /// The nearest rock and its plane on each ray, with its distance, m; infinite without a rock.
     #[inline(always)]
     fn rocks_met(
         &self,
@@ -198,7 +198,8 @@ impl<'a> Sampler<'a> {
         (nearest_m, met)
     }
 
-    /// Notes what a sample's ray meets: the ground at `ground_m`, m, where finite, or a rock, or something made, or nothing.
+    /// Records the hit of a sample's ray: the ground at `ground_m`, m, if finite, a rock, an artificial object, or the
+    /// sky.
     #[inline(always)]
     fn note(
         &self,
@@ -226,7 +227,7 @@ impl<'a> Sampler<'a> {
         }
     }
 
-    /// The shortest wavelength that the samples carry at a distance, under a cosine of emission, m.
+    /// The shortest wavelength that the samples resolve at a distance, for a cosine of emission, m.
     #[inline(always)]
     fn cutoff_m(&self, distance_m: f64, emission: f64) -> f32 {
         let footprint_m = distance_m * self.rad_per_px;
@@ -253,7 +254,7 @@ fn enter_one_by_one(rock: &Rock, rays: &RayLanes) -> (Lanes, [usize; LANES]) {
     (enter_m, planes)
 }
 
-/// A tile of a picture to be sampled with the widest vectors that the processor has.
+/// A tile of an image, sampled with the widest vectors that the processor has.
 struct Tile<'a, 's> {
     sampler: &'s Sampler<'a>,
     first: [i64; 2],

@@ -1,12 +1,12 @@
-//! Shading: the light of what the samples of a tile met, many at once.
+//! Shading: the radiance of a tile's samples, in vector lanes.
 //!
-//! The samples of a tile are grouped by surface, the ground or one rock, and shaded [`LANES`] at a time: the noise of
-//! their textures is the same program on other numbers, and the loops over lanes in `texture.rs` and `details.rs` become
-//! vectors as wide as the processor has, chosen when the program runs (`sampling.rs`).
+//! The samples of a tile are grouped by surface, the ground or one rock, and shaded [`LANES`] at a time. The noise of
+//! their textures is the same computation on other numbers, and the loops over lanes in `texture.rs` and `details.rs` use
+//! vectors as wide as the processor has, chosen at run time (`sampling.rs`).
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
-//! | c | `cutoff_m`: the shortest wavelength that the samples carry (`sampling.rs`) | m |
+//! | c | `cutoff_m`: the shortest wavelength that the samples resolve (`sampling.rs`) | m |
 //!
 //! Frame: site.
 
@@ -17,28 +17,28 @@ use crate::light::reflection::Appearance;
 use crate::world::World;
 use sightline_geometry::frames::{Point3, Ray, Vector3};
 
-/// The cutoff of a lane that holds no sample: longer than any wave, so that none is evaluated for its sake.
+/// Cutoff of a lane without a sample: longer than any wavelength, so that no octave is evaluated for it.
 const NOTHING_M: f32 = 1e9;
 
-/// A sample that met a surface.
+/// A sample whose ray met a surface.
 #[derive(Clone, Copy, Debug)]
 struct Sample {
-    /// Its number in the tile.
+    /// Index of the sample in the tile.
     number: usize,
     point: Point3,
     to_camera: [f32; 3],
     cutoff_m: f32,
 }
 
-/// What the samples of a tile met.
+/// The hits of a tile's samples.
 #[derive(Debug, Default)]
 pub(super) struct Seen {
     ground: Vec<Sample>,
     /// With rock and plane.
     rocks: Vec<(Sample, usize, usize)>,
-    /// By the samples' numbers; those of made things and of the sky are there at once.
+    /// By sample index; artificial objects and the sky are filled in at once.
     radiances: Vec<f32>,
-    /// Rocks that a ray of the pixel can meet, the nearest first, with their least distance, m.
+    /// Rocks that a ray of the pixel can meet, the nearest first, with their smallest distance, m.
     pub(super) rocks_in_view: Vec<(f64, usize)>,
     /// Rocks that can shade the ground of the pixel.
     shading: Vec<u32>,
@@ -53,18 +53,18 @@ impl Sample {
 }
 
 impl Seen {
-    /// Room for this many samples.
+    /// Allocates for this many samples.
     pub(super) fn new(count: usize) -> Self {
         Self { radiances: vec![0.0; count], ground: Vec::with_capacity(count), ..Self::default() }
     }
 
-    /// A sample met the ground.
+    /// Records a sample that met the ground.
     #[inline(always)]
     pub(super) fn ground(&mut self, number: usize, ray: &Ray, distance_m: f64, cutoff_m: f32) {
         self.ground.push(Sample::new(number, ray, distance_m, cutoff_m));
     }
 
-    /// A sample met a plane of a rock.
+    /// Records a sample that met a plane of a rock.
     #[inline(always)]
     pub(super) fn rock(
         &mut self,
@@ -77,7 +77,7 @@ impl Seen {
         self.rocks.push((Sample::new(number, ray, distance_m, cutoff_m), rock, plane));
     }
 
-    /// A sample met a made thing.
+    /// Records a sample that met an artificial object.
     pub(super) fn solid(
         &mut self,
         world: &World,
@@ -93,13 +93,13 @@ impl Seen {
         self.radiances[number] = world.light.reflected(&look, sample.to_camera, in_sun, 1.0);
     }
 
-    /// A sample met nothing.
+    /// Records a sample that met nothing.
     pub(super) fn sky(&mut self, world: &World, number: usize, ray: &Ray) {
         let direction = [ray.direction.x, ray.direction.y, ray.direction.z].map(|v| v as f32);
         self.radiances[number] = world.light.sky(direction);
     }
 
-    /// The radiance of every sample, by its number.
+    /// The radiance of every sample, by its index.
     #[inline(always)]
     pub(super) fn radiances(&mut self, world: &World) -> &[f32] {
         self.shade_ground(world);
@@ -126,7 +126,7 @@ impl Seen {
 
     #[inline(always)]
     fn shade_rocks(&mut self, world: &World) {
-        // Points of one rock lie close together in the noise, those of two do not.
+        // Points of one rock are close together in the noise, those of different rocks are not.
         self.rocks.sort_by_key(|(_, rock, _)| *rock);
         for samples in self.rocks.chunk_by(|(_, a, _), (_, b, _)| a == b).flat_map(|one| one.chunks(LANES)) {
             let looks = stone(world, samples);
@@ -141,7 +141,7 @@ impl Seen {
     }
 }
 
-/// The points of samples by component and lane, lanes without one repeating the first.
+/// The points of samples by component and lane; lanes without a sample repeat the first.
 #[inline(always)]
 fn points_of<'a>(samples: impl Iterator<Item = &'a Sample> + Clone) -> [Lanes; 3] {
     let first = samples.clone().next().map_or(Point3::origin(), |sample| sample.point);
@@ -154,7 +154,7 @@ fn points_of<'a>(samples: impl Iterator<Item = &'a Sample> + Clone) -> [Lanes; 3
     points
 }
 
-/// Whether each of the first `count` points gets no sun. `shading` is room for the rocks that can shade them.
+/// Whether each of the first `count` points is in shadow. `shading` is scratch space for the rocks that can shade them.
 #[inline(always)]
 fn in_shadow(world: &World, points: &[Lanes; 3], count: usize, shading: &mut Vec<u32>) -> [bool; LANES] {
     let middle = Point3::new(points[0][0], points[1][0], points[2][0]);
@@ -163,7 +163,7 @@ fn in_shadow(world: &World, points: &[Lanes; 3], count: usize, shading: &mut Vec
         let (x, y, z) = (points[0][lane] - middle.x, points[1][lane] - middle.y, points[2][lane] - middle.z);
         nearness[lane] = -(x * x + y * y + z * z);
     }
-    // Room for rounding, as at the rocks' own spheres.
+    // Margin for rounding, as in the rocks' own bounding spheres.
     let radius_m = (-least(&nearness)).sqrt() * (1.0 + 1e-9);
     if world.sun_grid.near(&middle, radius_m, world.rocks(), shading) {
         return world.in_shadow_lanes(points, count, shading);
@@ -175,7 +175,7 @@ fn in_shadow(world: &World, points: &[Lanes; 3], count: usize, shading: &mut Vec
     is_dark
 }
 
-/// The look of soil at samples.
+/// Appearance of the soil at samples.
 #[inline(always)]
 fn soil(world: &World, samples: &[Sample]) -> [Appearance; LANES] {
     // Lanes without a sample repeat the first point.
@@ -189,7 +189,7 @@ fn soil(world: &World, samples: &[Sample]) -> [Appearance; LANES] {
     scenery.surfaces.soil(&scenery.terrain, &p_m, &cutoff_m, samples.len())
 }
 
-/// The look of one rock at samples.
+/// Appearance of one rock at samples.
 #[inline(always)]
 fn stone(world: &World, samples: &[(Sample, usize, usize)]) -> [Appearance; LANES] {
     let scenery = &*world.scenery;

@@ -1,13 +1,12 @@
-//! What the placing of rocks must know of a drive that is more than a straight line: where it looks, where its wheels
-//! go.
+//! The ground that the cameras see and the wheels cover on a drive that is more than a straight line, for placing rocks.
 //!
-//! A place is worth a rock when it lies in the wedge that either eye of some stop sees. The wedge of an eye starts
-//! at its centre C and opens along its axis in the level: places a ahead and s aside with a > 0 and
-//! `s ≤ 2 m + w a`, the 2 m being for what throws its shadow into the picture; a camera that looks down also sees
-//! what lies beside and behind C, as far as its picture shows it. The widening w is the least that holds every ray
-//! of the picture's border where it meets the plan's flat ground, up to `FARTHEST_M`, the head turned to either
-//! side by what it may be off; it is at least 0.46 (tan 25°). A fisheye's wedge ends after `FISHEYE_M` where it is
-//! wider than 0.6. Rocks keep clear of the wheels' lines on flat ground, and high ones of the belly.
+//! A point gets rocks if it is in the view wedge of either camera of some stop. The wedge starts at the camera's centre C
+//! and opens along its axis in the horizontal plane: points a ahead and s aside with a > 0 and `s ≤ 2 m + w a`, where 2 m
+//! is for rocks that cast shadows into the image. For a camera that looks down the wedge also extends beside and behind C
+//! as far as the image shows ground. The widening w is the smallest for which the wedge contains the flat-ground
+//! intersections of all rays of the image's border, up to `FARTHEST_M`, with the head rotated to either side by the
+//! largest pointing error; it is at least 0.46 (tan 25°). Beyond `FISHEYE_M` the wedge of a fisheye has w ≤ 0.6. Rocks
+//! keep clear of the wheel paths on flat ground, and high ones of the belly.
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
@@ -27,39 +26,39 @@ use sightline_geometry::frames::{Pixel, Point3, Pose};
 
 /// Half of a wheel's width and a margin, m.
 const WHEEL_M: f64 = 0.13;
-/// How far the belly reaches from the rover's middle, m (ours).
+/// Distance from the rover's origin within which a rock can touch the belly, m (ours).
 const BELLY_REACH_M: f64 = 0.6;
-/// How far to the side of what a picture shows a rock may shade it, m.
+/// Distance beside the visible ground within which a rock may shade it, m.
 const ASIDE_M: f64 = 2.0;
-/// The least widening of a wedge for each metre ahead.
+/// Smallest widening of a wedge, m aside per m ahead.
 const WIDENING: f64 = 0.46;
-/// How far pictures are followed, m.
+/// Largest distance up to which the field of view is followed, m.
 const FARTHEST_M: f64 = 100.0;
-/// How far rocks fill the sides of a fisheye's picture, m (ours: beyond, one of 0.25 m spans four of its pixels), and
-/// the widening of its middle that goes on.
+/// Distance up to which rocks fill the sides of a fisheye's view, m (ours: beyond it, a rock of 0.25 m spans four of its
+/// pixels), and the widening of the middle part that continues beyond.
 const FISHEYE_M: f64 = 30.0;
 const FISHEYE_WIDENING: f64 = 0.6;
-/// Rays along each side of a picture's border.
+/// Rays along each side of an image's border.
 const BORDER_RAYS: u32 = 16;
-/// By how much a real stop looks elsewhere than the plan's because of the ground under its wheels, rad (ours).
+/// Largest difference of the viewing direction between plan and drive due to uneven ground under the wheels, rad (ours).
 const UNEVEN_RAD: f64 = 0.03;
 
-/// How badly the mast may point for the wedge of a straight approach to hold what it shows, rad: 0.46 less the 0.41 of
-/// half a picture.
+/// Largest pointing error for which the wedge of a straight approach contains the view, rad: 0.46 less the 0.41 of half an
+/// image.
 const STRAIGHT_POINTING_RAD: f64 = 0.04;
 
-/// What one eye sees of the ground at one stop.
+/// The ground that one camera sees at one stop.
 #[derive(Clone, Debug, PartialEq)]
 struct Wedge {
     from_m: [f64; 2],
-    /// Unit direction of the axis in the level.
+    /// Unit direction of the optical axis in the horizontal plane.
     along: [f64; 2],
     widening: f64,
-    /// How far behind its centre a picture that looks down shows the ground, m.
+    /// Distance behind the centre up to which the image of a camera that looks down shows ground, m.
     behind_m: f64,
 }
 
-/// Where a drive of moves looks and goes.
+/// View wedges, wheel positions and rover positions of a planned drive.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Around {
     goal_m: [f64; 2],
@@ -69,8 +68,8 @@ pub(crate) struct Around {
 }
 
 impl Around {
-    /// Of a drive with its cameras; nothing for a straight approach along x with well-pointed cameras on the mast and no pair that is
-    /// turned elsewhere, whose wedge and lane are known without it.
+    /// For a drive with its cameras. `None` for a straight approach along x with the main pair on the mast, a small pointing
+    /// error and no pair turned elsewhere: its wedge and lane follow from constants.
     pub(crate) fn new(drive: &DriveSettings, camera: &CameraSettings) -> Option<Self> {
         let is_straight = drive.course == Course::Approach && drive.heading_deg == 0.0;
         let is_narrow = !camera.rig.is_on_body() && pointing_rad(drive) <= STRAIGHT_POINTING_RAD;
@@ -107,19 +106,19 @@ impl Around {
         })
     }
 
-    /// How far from the targets' centre the cameras stand at the farthest stop, with a margin, m.
+    /// Largest distance of a camera from the targets' centre, with a margin, m.
     pub(crate) fn reach_m(&self) -> f64 {
         let [x_m, y_m] = self.goal_m;
         let off_m = |wedge: &Wedge| (wedge.from_m[0] - x_m).hypot(wedge.from_m[1] - y_m);
         self.wedges.iter().map(off_m).fold(0.0, f64::max) + ASIDE_M
     }
 
-    /// Whether some stop looks at a place.
+    /// Whether a point is in the view of some stop.
     pub(crate) fn sees(&self, x_m: f64, y_m: f64) -> bool {
         self.wedges.iter().any(|wedge| wedge.holds(x_m, y_m))
     }
 
-    /// Whether a rock of this reach (m) would stand under a wheel, or one higher than the belly under the rover.
+    /// Whether a rock of this radius (m) would be under a wheel or, if `touches_belly`, under the rover.
     pub(crate) fn is_in_the_way(&self, x_m: f64, y_m: f64, reach_m: f64, touches_belly: bool) -> bool {
         let near = |places: &[[f64; 2]], by_m: f64| {
             places.iter().any(|place| (place[0] - x_m).powi(2) + (place[1] - y_m).powi(2) < by_m * by_m)
@@ -129,28 +128,28 @@ impl Around {
     }
 }
 
-/// By how much the head may be turned elsewhere than where it is told, rad.
+/// Largest difference between true and commanded azimuth of the head, rad.
 fn pointing_rad(drive: &DriveSettings) -> f64 {
     let off_deg =
         3.0 * drive.pointing_error_deg + 0.5 * drive.mast_backlash_deg + drive.mast_offset_deg[0].abs();
     off_deg.to_radians()
 }
 
-/// What both eyes see at a stop of the plan, the mast pointed at the targets' centre.
+/// View wedges of both cameras at a stop of the plan, with the mast pointed at the targets' centre.
 fn wedges(rig: &Rig, stop: &TrueStop, goal: &Point3, off_by_rad: f64) -> Vec<Wedge> {
     let site_from_rover: &Pose = &stop.site_from_rover;
     let Ok(angles) = rig.point_at(&site_from_rover.inverse_transform_point(goal)) else { return Vec::new() };
     seen(rig, angles, site_from_rover, off_by_rad).to_vec()
 }
 
-/// What both eyes of a rig see at mast angles.
+/// View wedges of both cameras of a rig at mast angles.
 fn seen(rig: &Rig, angles: Option<MastAngles>, site_from_rover: &Pose, off_by_rad: f64) -> [Wedge; 2] {
     let (left, right) = rig.cameras_in_rover(angles);
     [left, right].map(|eye| Wedge::of(&eye.moved(site_from_rover), off_by_rad))
 }
 
 impl Wedge {
-    /// Of a camera that stands in the site.
+    /// The wedge of a camera in the site frame.
     fn of(camera: &Camera, off_by_rad: f64) -> Self {
         let (centre, axis) = (camera.model.centre(), camera.model.axis());
         let level = axis.xy().normalize();
@@ -170,7 +169,7 @@ impl Wedge {
         wedge
     }
 
-    /// How far ahead and to either side a place lies, m.
+    /// Distance of a point ahead and to either side, m.
     fn split(&self, [x_m, y_m]: [f64; 2]) -> [f64; 2] {
         let (dx, dy) = (x_m - self.from_m[0], y_m - self.from_m[1]);
         let [ux, uy] = self.along;
@@ -184,7 +183,7 @@ impl Wedge {
     }
 }
 
-/// Where the rays of a picture's border meet flat ground no farther than [`FARTHEST_M`], site frame, m.
+/// Intersections of the image border's rays with flat ground up to [`FARTHEST_M`], site frame, m.
 fn border_on_ground(camera: &Camera) -> impl Iterator<Item = [f64; 2]> {
     let [right, bottom] = [camera.width(), camera.height()].map(|side| f64::from(side) - 0.5);
     let pixels = (0..=BORDER_RAYS).flat_map(move |k| {
@@ -196,7 +195,7 @@ fn border_on_ground(camera: &Camera) -> impl Iterator<Item = [f64; 2]> {
         let ray = camera.ray(pixel)?;
         let level_m = ray.direction.xy().norm();
         let to_ground_m = (MEAN_GROUND_Z_M - ray.origin.z) / ray.direction.z;
-        // A ray just above the horizon shows what stands on the farthest ground.
+        // A ray just above the horizon shows rocks on the farthest ground.
         let is_near_horizon = ray.direction.z > -0.1 * level_m && level_m > 0.0;
         let farthest_m = FARTHEST_M / level_m.max(1e-9);
         let distance_m = if ray.direction.z > 0.0 { to_ground_m.min(farthest_m) } else { farthest_m };
@@ -243,9 +242,9 @@ mod tests {
             around.sees(x_m + 40.0, y_m) && around.sees(x_m + 40.0 * last.cos(), y_m + 40.0 * last.sin())
         );
         assert!(!around.sees(x_m - 40.0, y_m) && !around.sees(x_m, y_m - 40.0));
-        // A front wheel of the first stop stands at (0.70, 0.53) of the rover.
+        // A front wheel of the first stop is at (0.70, 0.53) in the rover frame.
         assert!(around.is_in_the_way(0.70, 0.53, 0.05, false) && !around.is_in_the_way(1.5, 0.1, 0.05, true));
-        // Between the wheels of a straight drive only the belly is in danger.
+        // Between the wheels of a straight drive only rocks that touch the belly matter.
         let moves = vec![Move::Forward { distance_m: 1.0, stops: 1 }];
         let straight = Around::new(&DriveSettings { moves, ..drive }, &CameraSettings::default()).unwrap();
         assert!(

@@ -1,29 +1,29 @@
-//! The walk of a ray over the blocks of the ground's grid: blocks of 64, 16, 4 and 1 cells, one inside the other.
+//! Traversal of the ground's grid along a ray: nested blocks of 64, 16, 4 and 1 cells.
 //!
 //! A block is skipped while the ray stays above its highest point. A hierarchical digital differential analyser over a
-//! pyramid of maxima; the blocks' heights may be those of the blocks or of the blocks with their neighbours.
+//! pyramid of maxima; each maximum is that of the block, or of the block and its neighbours.
 
 use crate::ground::terrain::{BLOCK_SHIFT, Tops};
 
-/// A ray in units of cells: position (p + d t), t in metres.
+/// A ray in units of cells: position p + d t, t in metres.
 pub(super) struct CellRay {
     pub(super) p: [f64; 2],
     pub(super) d: [f64; 2],
-    /// 1/d, infinite where the ray does not move along the axis.
+    /// 1/d, infinite if d is 0.
     pub(super) inverse: [f64; 2],
     pub(super) z_m: f64,
     pub(super) dz: f64,
 }
 
-/// A walk of a ray over blocks of cells, from coarse to fine.
+/// Traversal of nested blocks of cells along a ray, from coarse to fine.
 pub(super) struct Blocks<'a, IsLeaf, Leaf> {
     /// Highest points of the blocks of each level.
     pub(super) tops: &'a [Tops],
     /// Cells along x and y.
     pub(super) cells: [usize; 2],
-    /// Whether a block of a level that the ray enters, to leave it at a distance (m), is not divided further.
+    /// Whether a block is not subdivided, given its level and the distance at which the ray leaves it, m.
     pub(super) is_leaf: IsLeaf,
-    /// The result for a block: its first cell, where the ray enters and leaves it, m.
+    /// The result for a block, given its first cell and the distances of entry and exit, m.
     pub(super) leaf: Leaf,
 }
 

@@ -1,16 +1,16 @@
-//! The strip of ground without high rocks in which a rover is driven on commands (`rocks.clear_path`).
+//! The strip of ground without high rocks for commanded drives (`rocks.clear_path`).
 //!
-//! The strip is a rectangle about the straight line from the first stop to the end of the path. It is longer than the line
-//! at both ends, by as much as the wheels reach beyond the rover frame's origin. A rock whose outline reaches into it and
-//! that is higher than `above_m` is removed. All rocks are placed first, so that the others are those of the world without
-//! the strip.
+//! The strip is a rectangle about the straight line from the first stop to the end of the path, extended at both ends by
+//! the distance from the rover frame's origin to the outermost wheel. A rock is removed if its outline overlaps the strip
+//! and it is higher than `above_m`. All rocks are placed first, so that the others are those of the world without the
+//! strip.
 //!
 //! Frame: site, m. Sources: ours; papers.md R99 (rocks below 10 cm do not disturb an approach).
 
 use crate::rover::suspension::{WHEEL_RADIUS_M, WHEELS_M};
 use crate::scenario::ClearPath;
 
-/// How far front and rear wheels reach beyond the rover frame's origin, with a margin, m.
+/// Distance from the rover frame's origin to the outermost point of a wheel, with a margin, m.
 const WHEELS_REACH_M: f64 = WHEELS_M[0][0] + WHEEL_RADIUS_M + 0.1;
 
 /// Whether a rock at `place_m` is removed; `reach_m` is the radius of its outline. The targets' centre is at `centre_m`,

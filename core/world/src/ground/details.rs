@@ -1,16 +1,16 @@
-//! What makes surfaces look natural beside noise: grains and drifts on soil, veins and pits in rock.
+//! Surface details beyond noise: grains and drifts on soil, veins and pits in rock.
 //!
 //! * **Grains** are small stones below the size of the geometric pebbles: five-sided frusta in the cells of jittered
-//!   square lattices, at most one to a cell and wholly inside it, so that one hash finds it. Their sides lie
-//!   within a circle of radius r, have the slope 0.8 and a flat top, and each grain has its own albedo.
-//! * **Drifts** are smooth patches of fine bright dust: where noise of 0.4 and 0.8 m exceeds a level, most
+//!   square lattices, at most one to a cell and wholly inside it, so that one hash finds it. Their sides are
+//!   within a circle of radius r and have the slope 0.8, their top is flat, and each grain has its own albedo.
+//! * **Drifts** are smooth patches of fine bright dust: where noise of 0.4 and 0.8 m exceeds a threshold, most
 //!   grains vanish and the soil's micro-relief is flattened.
 //! * **Veins** are thin bright sheets through a rock: where noise of 6 and 12 cm crosses zero.
 //! * **Pits** are small dark hollows, spheres in the cells of a lattice cut by the surface.
 //!
-//! Nothing repeats (`texture.rs`: hashes of full lattice coordinates). Each fades out like an octave of its own
-//! size when a picture cannot resolve it. All contrasts are multiples of the texture's `albedo_std`, so that a
-//! surface without texture has no details either; slopes of grains and pits are those of solid shapes.
+//! Nothing repeats (`texture.rs`: hashes of full lattice coordinates). Each detail fades out like an octave of its own
+//! size when an image cannot resolve it. All contrasts are multiples of the texture's `albedo_std`, so that a surface
+//! without texture has no details either; slopes of grains and pits are those of solid shapes.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -31,12 +31,12 @@ use crate::ground::value_noise::{Cells, Points, cell_hash, cell_of};
 const GRAIN_CELLS_M: [f64; 3] = [0.026, 0.012, 0.006];
 /// Side of the cells of the pits' lattice, m.
 const PIT_CELL_M: f64 = 0.016;
-/// Mean of 2.378 (r/cell)² for r/cell even in 0.20 to 0.45: the part of its cell that a pentagon covers.
+/// Mean of 2.378 (r/cell)² for r/cell uniform in 0.20 to 0.45: the fraction of its cell that a pentagon covers.
 const GRAIN_PART: f64 = 0.2636;
-/// Distance of a pentagon's sides from its middle, over the radius of the circle around it: cos 36°.
+/// Distance of a pentagon's sides from its centre over its circumradius: cos 36°.
 const PENTAGON: f32 = 0.809_017;
 
-/// A deviation of albedo (relative) and slope.
+/// A deviation of albedo (relative) and of slope (m/m).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Detail<const DIMENSIONS: usize> {
     pub(super) albedo: f32,
@@ -51,7 +51,7 @@ impl<const DIMENSIONS: usize> Detail<DIMENSIONS> {
 #[derive(Clone, Debug)]
 pub(super) struct SoilDetails {
     drifts: Octaves<2>,
-    /// Level of the noise above which drifts lie, in its standard deviations; infinite without drifts.
+    /// Threshold of the noise above which drifts form, in its standard deviations; infinite without drifts.
     drift_level: f32,
     /// Probability of a grain in a cell.
     grains: f32,
@@ -85,7 +85,7 @@ fn byte(hash: u32, index: u32) -> f32 {
     ((hash >> (8 * index)) & 0xff) as f32 / 255.0
 }
 
-/// The slope of a five-sided frustum inside the unit circle, turned by its hash; nothing beside it.
+/// The slope of a five-sided frustum inside the unit circle, rotated by its hash; `None` outside it.
 #[inline(always)]
 fn frustum_slope(d: [f32; 2], hash: u32) -> Option<[f32; 2]> {
     let (mut sin, mut cos) = (std::f32::consts::TAU / 5.0 * byte(hash, 3)).sin_cos();
@@ -98,16 +98,17 @@ fn frustum_slope(d: [f32; 2], hash: u32) -> Option<[f32; 2]> {
         }
         (cos, sin) = (cos * step_cos - sin * step_sin, sin * step_cos + cos * step_sin);
     }
-    // Down is positive: the ground rises (z falls) towards the middle.
+    // Down is positive: the ground rises (z falls) towards the centre.
     let top = 0.25 + 0.3 * byte(hash, 2);
     (outmost < PENTAGON).then(|| if outmost > top { side.map(|c| 0.8 * c) } else { [0.0; 2] })
 }
 
 impl SoilDetails {
-    /// Details whose grains cover the part `grain_cover` of the soil, and drifts about `drift_cover`.
+    /// Details with a grain cover of `grain_cover` and a drift cover of about `drift_cover`, as fractions of the soil's
+    /// area.
     pub(super) fn new(grain_cover: f64, drift_cover: f64, albedo_std: f64, seed: u64) -> Self {
         let levels = GRAIN_CELLS_M.len() as f64;
-        // The sum of two octaves of value noise is near a normal distribution; a logistic curve is close enough here.
+        // The sum of two octaves of value noise is nearly normal; a logistic curve approximates it well enough.
         let drift_level =
             if drift_cover > 0.0 { (1.0 / drift_cover - 1.0).ln() / 1.702 } else { f64::INFINITY };
         Self {
@@ -119,7 +120,7 @@ impl SoilDetails {
         }
     }
 
-    /// How much of a drift lies at each of many places, 0 to 1.
+    /// Strength of the drift at each of many points, 0 to 1.
     #[inline(always)]
     pub(super) fn drifts(&self, points: &Points<2>) -> [f32; LANES] {
         if self.drift_level == f32::INFINITY {
@@ -133,7 +134,7 @@ impl SoilDetails {
         drifts
     }
 
-    /// The grains at each of many places.
+    /// The grains at each of many points.
     #[inline(always)]
     pub(super) fn grains(&self, p_m: &[[f64; LANES]; 2], cutoff_m: &[f32; LANES]) -> TextureLanes<2> {
         let mut sum = TextureLanes { albedo: [0.0; LANES], slope: [[0.0; LANES]; 2] };
@@ -174,9 +175,10 @@ impl SoilDetails {
     }
 }
 
-/// The tone (−½ to ½) and slope of the grain of a cell's hash at a place (0 to 1) in the cell, if it lies there.
+/// The tone (−½ to ½) and slope of the grain given by a cell's hash, at a position (0 to 1) in the cell; `None` outside
+/// it.
 fn grain(hash: u32, [u, v]: [f32; 2]) -> Option<(f32, [f32; 2])> {
-    // Of the four bytes one decides whether there is a grain, one makes the size, two the place.
+    // Of the four bytes one decides whether there is a grain, one its size, two its position.
     let radius = 0.20 + 0.25 * byte(hash, 1);
     let room = 1.0 - 2.0 * radius;
     let d = [u - radius - room * byte(hash, 2), v - radius - room * byte(hash, 3)].map(|c| c / radius);
@@ -188,7 +190,7 @@ fn grain(hash: u32, [u, v]: [f32; 2]) -> Option<(f32, [f32; 2])> {
 }
 
 impl RockDetails {
-    /// Details of rocks whose texture has this standard deviation.
+    /// Details of rocks whose texture has this standard deviation of albedo.
     pub(super) fn new(albedo_std: f64, seed: u64) -> Self {
         Self {
             veins: Octaves::new(&broad_noise(0.12), mix(seed ^ 0x7e15)),
@@ -197,7 +199,7 @@ impl RockDetails {
         }
     }
 
-    /// The brightness of veins at each of many points of rocks, relative, each with its strength.
+    /// Relative brightness of veins at each of many points of rocks, each with its strength.
     #[inline(always)]
     pub(super) fn veins(
         &self,
@@ -215,7 +217,7 @@ impl RockDetails {
         veins
     }
 
-    /// The pits at a point of a rock; the slope is that of the surface's height over its face.
+    /// The pits at a point of a rock; the slope is that of the height over its face.
     #[inline(always)]
     pub(super) fn pits(&self, p_m: [f64; 3], strength: f32, cutoff_m: f32) -> Detail<3> {
         let weight = weight(PIT_CELL_M as f32, cutoff_m);
@@ -236,7 +238,7 @@ impl RockDetails {
         if square >= 1.0 {
             return Detail::NONE;
         }
-        // Hollow: the height over the face grows outwards from the middle.
+        // Hollow: the height over the face grows outwards from the centre.
         Detail {
             albedo: -weight * 1.5 * self.contrast * (1.0 - square),
             slope: d.map(|c| weight * 0.9 * c / radius),
@@ -264,7 +266,7 @@ mod tests {
             count += LANES as f64;
             assert_eq!((far.albedo, far.slope), ([0.0; LANES], [[0.0; LANES]; 2]));
         }
-        // Of the grains of three lattices few overlap: (1 − 0.04)³ is left bare.
+        // Few grains of the three lattices overlap: (1 − 0.04)³ stays bare.
         assert!((grains / count / 0.115 - 1.0f64).abs() < 0.05, "{}", grains / count);
         assert!((drifts / count / 0.3 - 1.0f64).abs() < 0.2, "{}", drifts / count);
     }
@@ -287,7 +289,7 @@ mod tests {
                     }
                 }
             }
-            // A pentagon fills 2.378/π of the circle around it.
+            // A pentagon fills 2.378/π of its circumscribed circle.
             assert!((f64::from(beside) / 2000.0 - 0.243).abs() < 0.01, "{beside}");
             assert!(flat > 100 && falling > 500, "{flat} {falling}");
         }

@@ -1,16 +1,15 @@
-//! Far ground: beyond some distance a slope turns back to the level of the planet, so that the horizon is level.
+//! Far ground: beyond a given distance a slope returns to the mean level, so that the horizon is level.
 //!
 //! Within ρ0 of the site's origin the mean ground is the plane `z = z0 + s`, `s = a x + b y`. Beyond, it is
 //! ```text
 //! z(x, y) = z0 + (ρ0/ρ)² s,    ∇z = (ρ0/ρ)² [ (a, b) − 2 s (x, y)/ρ² ],    ρ² = x² + y²
 //! ```
-//! which continues the plane at ρ0, is nowhere steeper than it, and nears the level z0: uphill the slope ends in a
-//! crest, downhill in the bottom of a valley whose far side rises to the horizon. Level ground has none of it.
+//! which continues the plane at ρ0, is nowhere steeper than it, and approaches the level z0: uphill the slope ends in a
+//! crest, downhill in a valley whose far side rises to the horizon. Level ground has no such part.
 //!
-//! **Intersection.** Along a ray `F(t) = z_ray(t) − z(t)`, above 0 below the ground, has the sign of the cubic
-//! `P(t) = (p + d_z t)(A t² + 2 B t + C) − ρ0² (s_o + s_d t)`. Between the roots of P' it is monotone, so that
-//! the first of these intervals at whose end F is no longer below 0 holds the hit; it is found by secants and bisection
-//! down to neighbouring numbers.
+//! **Intersection.** Along a ray `F(t) = z_ray(t) − z(t)`, positive below the ground, has the sign of the cubic
+//! `P(t) = (p + d_z t)(A t² + 2 B t + C) − ρ0² (s_o + s_d t)`. Between the roots of P' it is monotone, so that the first
+//! of these intervals at whose end F is not negative contains the hit; secants and bisection find it to the last bit.
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
@@ -25,7 +24,7 @@
 use crate::ground::level::MEAN_GROUND_Z_M;
 use sightline_geometry::frames::Ray;
 
-/// Ground farther than this along a ray is not looked for, m.
+/// Largest distance along a ray at which ground is searched, m.
 const FARTHEST_M: f64 = 1e7;
 
 /// The ground beyond the slope.
@@ -36,12 +35,12 @@ pub(crate) struct Far {
 }
 
 impl Far {
-    /// Around a slope that reaches as far as `radius_m`.
+    /// The ground beyond a slope of radius `radius_m`.
     pub(crate) fn new(radius_m: f64, tilt: [f64; 2]) -> Self {
         Self { radius_m, tilt }
     }
 
-    /// (ρ0/ρ)² and ρ², m², at a place beyond the slope; nothing on it.
+    /// (ρ0/ρ)² and ρ², m², at a point beyond the slope; `None` on the slope.
     fn beyond(&self, x_m: f64, y_m: f64) -> Option<(f64, f64)> {
         let (square_m2, rho_m2) = (self.radius_m * self.radius_m, x_m * x_m + y_m * y_m);
         (rho_m2 > square_m2).then(|| (square_m2 / rho_m2, rho_m2))
@@ -51,20 +50,20 @@ impl Far {
         self.tilt[0] * x_m + self.tilt[1] * y_m
     }
 
-    /// Height at a place beyond the slope, m down.
+    /// z at a point beyond the slope, m, positive down; `None` on the slope.
     pub(crate) fn z_at(&self, x_m: f64, y_m: f64) -> Option<f64> {
         let (part, _) = self.beyond(x_m, y_m)?;
         Some(MEAN_GROUND_Z_M + part * self.rise_m(x_m, y_m))
     }
 
-    /// Gradient of the height at a place beyond the slope, m/m.
+    /// Gradient of z at a point beyond the slope, m/m; `None` on the slope.
     pub(crate) fn gradient_at(&self, x_m: f64, y_m: f64) -> Option<[f64; 2]> {
         let (part, rho_m2) = self.beyond(x_m, y_m)?;
         let along = 2.0 * self.rise_m(x_m, y_m) / rho_m2;
         Some([part * (self.tilt[0] - along * x_m), part * (self.tilt[1] - along * y_m)])
     }
 
-    /// Where a ray is over the slope itself: from and to, m; empty where it passes beside it.
+    /// The interval in which a ray is over the slope itself, m; empty if it passes beside it.
     pub(crate) fn over_slope(&self, ray: &Ray) -> [f64; 2] {
         let [a, b, c] = rho_squared(ray);
         let room_m2 = c - self.radius_m * self.radius_m;
@@ -119,19 +118,20 @@ fn rho_squared(ray: &Ray) -> [f64; 3] {
     [d.norm_squared(), o.dot(&d), o.norm_squared()]
 }
 
-/// The roots in ascending order of the derivative of c3 t³ + c2 t² + c1 t, NaN where there are none.
+/// The roots of the derivative of c3 t³ + c2 t² + c1 t in ascending order, NaN where there are none.
 fn turns([c3, c2, c1]: [f64; 3]) -> [f64; 2] {
     let discriminant = c2 * c2 - 3.0 * c3 * c1;
-    // Both roots without cancellation; NaN and infinity stand for roots that do not exist.
+    // Both roots without cancellation; NaN and infinity mark roots that do not exist.
     let w = -(c2 + discriminant.sqrt().copysign(c2));
     let roots = [w / (3.0 * c3), c1 / w];
     if roots[0] > roots[1] { [roots[1], roots[0]] } else { roots }
 }
 
-/// The first number at which `below_m` is no longer negative, between one where it is and one where it is not.
+/// The first floating-point number at which `below_m` is not negative, between `above`, where it is negative, and `below`,
+/// where it is not.
 ///
-/// If the curve is nearly straight, the root lies within a thousandth of the interval from the root of the chord, and the two probes
-/// there enclose it. The middle halves the interval in any case.
+/// If the curve is nearly straight, the root is within a thousandth of the interval from the root of the chord, and two
+/// probes there enclose it. The midpoint halves the interval in any case.
 fn first_below(below_m: impl Fn(f64) -> f64, mut above: f64, mut below: f64) -> f64 {
     let (mut from_m, mut to_m) = (below_m(above), below_m(below));
     loop {
@@ -228,7 +228,7 @@ mod tests {
     #[test]
     fn the_horizon_below_a_slope_is_level() {
         let terrain = slope();
-        // Downhill and across the slope the least depression that still meets ground is within 0.01° of level.
+        // Downhill and across the slope the least depression that still meets ground is within 0.01° of horizontal.
         for azimuth_deg in (130..=310).step_by(10) {
             let (sine, cosine) = f64::from(azimuth_deg).to_radians().sin_cos();
             let meets = |down_deg: f64| {

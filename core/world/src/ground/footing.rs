@@ -1,18 +1,18 @@
-//! What wheels stand on: the ground, and the rocks that they can climb.
+//! Footing: the surface that supports the wheels, which is the ground and the rocks that wheels can climb.
 //!
-//! A wheel is 16 cm wide, while its contact is that of a thin disc (`suspension.rs`). For the disc a rock is therefore
-//! given a skirt that falls off within half a wheel's width, so that a rock under the wheel's shoulder
-//! lifts it, the higher the nearer it is to the middle; and no disc ever hangs on a vertical edge. The rock under
-//! its skirt is convex: what is seen of it from above is the highest of all points under every facet that is less
-//! steep than S and under a plane of slope S in each of sixteen directions d that just touches the rock:
+//! A wheel is 16 cm wide, while its contact model is a thin disc (`suspension.rs`). For the disc each rock therefore has a
+//! skirt that falls off within half a wheel's width: a rock under the wheel's shoulder lifts it, the more the nearer it is
+//! to the wheel's middle, and no disc hangs on a vertical edge. A rock with its skirt is convex: its upper surface is the
+//! highest one below the planes of all facets less steep than S, and below planes of slope S that touch the rock in each
+//! of sixteen directions d:
 //! ```text
 //! z(p) = max over facets and skirts of z0 + g·p      facet: g = −(n_x, n_y)/n_z, z0 = h/n_z      (z down)
 //! skirt: g = S d,  z0 = min over vertices v of v_z − S d·(v_x, v_y),   S = max(1, H / (w/2))
 //! footing(x, y) = min of the ground's z and of z over the rocks near there
 //! ```
-//! The top of a rock is met exactly. Rocks whose height H is above `rover.climb_m` are no footing: a planner drives around
-//! them, and a drive that leads a wheel against one is refused (`course.rs`). Fiducials and occluders, which
-//! no rover meets, are none either.
+//! The top of a rock is met exactly. Rocks whose height H is above `rover.climb_m` are not part of the footing: a planner
+//! avoids them, and a drive that leads a wheel against one is rejected (`course.rs`). Fiducials and occluders, which no
+//! rover meets, are not part of it either.
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
@@ -30,9 +30,9 @@ use crate::ground::terrain::Terrain;
 use crate::rover::suspension::WHEEL_WIDTH_M;
 use sightline_geometry::frames::{Point3, Ray, Vector3};
 
-/// Side of a cell of the map of rocks, m.
+/// Side of a cell of the rock grid, m.
 const CELL_M: f64 = 0.25;
-/// Directions in which a rock has a skirt.
+/// Number of skirt directions of a rock.
 const SKIRTS: u32 = 16;
 
 /// A plane z = z0 + g·p, p from the centre of its rock.
@@ -42,29 +42,29 @@ struct Face {
     gradient: [f64; 2],
 }
 
-/// A rock as wheels meet it.
+/// A rock with its skirt.
 #[derive(Clone, Debug)]
 struct Tent {
     centre: Point3,
-    /// Beyond this from the centre the skirt lies below the ground, m.
+    /// Radius from the centre beyond which the skirt is below the ground, m.
     reach_m: f64,
     faces: Vec<Face>,
 }
 
-/// The rocks around a drive, as its wheels meet them.
+/// The rocks around a drive as obstacles and supports for wheels.
 #[derive(Clone, Debug)]
 pub(crate) struct Footing {
     origin_m: [f64; 2],
     cells: [usize; 2],
-    /// The tents that reach into each cell.
+    /// Indices of the tents that overlap each cell.
     climbed: Vec<Vec<u32>>,
     tents: Vec<Tent>,
-    /// The rocks too high to climb that reach into each cell, by their numbers in the world.
+    /// Indices (in the world) of the rocks too high to climb that overlap each cell.
     avoided: Vec<Vec<u32>>,
 }
 
 impl Footing {
-    /// The rocks that stand on the rectangle `x_m` × `y_m` of the site; wheels climb those of up to `climb_m`.
+    /// The rocks on the rectangle `x_m` × `y_m` of the site frame; wheels climb rocks up to `climb_m`.
     pub(crate) fn new(rocks: &[Rock], x_m: [f64; 2], y_m: [f64; 2], climb_m: f64) -> Self {
         let cells = [x_m, y_m].map(|[from, to]| ((to - from) / CELL_M).ceil().max(1.0) as usize);
         let none = vec![Vec::new(); cells[0] * cells[1]];
@@ -86,7 +86,7 @@ impl Footing {
         footing
     }
 
-    /// The cells that a circle reaches into, by its square.
+    /// Indices of the cells that the square around a circle overlaps.
     fn cells_around(&self, centre: &Point3, reach_m: f64) -> Vec<usize> {
         let range = |k: usize| {
             let cell = |by_m: f64| (centre[k] + by_m - self.origin_m[k]) / CELL_M;
@@ -103,7 +103,7 @@ impl Footing {
             .then(|| p[1] as usize * self.cells[0] + p[0] as usize)
     }
 
-    /// Height of what a wheel stands on at a place, m down.
+    /// z of the footing at a point, site frame, m, positive down.
     pub(crate) fn z_at(&self, terrain: &Terrain, x_m: f64, y_m: f64) -> f64 {
         let ground_z_m = terrain.z_at(x_m, y_m);
         let Some(cell) = self.cell(x_m, y_m) else { return ground_z_m };
@@ -112,7 +112,7 @@ impl Footing {
         })
     }
 
-    /// The height of the rock, m, that stands at a place and is too high to climb, if one does.
+    /// Height of the rock at a point that is too high to climb, m; `None` if there is none.
     pub(crate) fn blocked_by_m(&self, rocks: &[Rock], x_m: f64, y_m: f64) -> Option<f64> {
         let down = Ray { origin: Point3::new(x_m, y_m, 0.0), direction: Vector3::z() };
         let near = self.avoided[self.cell(x_m, y_m)?].iter().map(|&number| &rocks[number as usize]);
@@ -137,7 +137,7 @@ impl Tent {
         let outline_m = rock.vertices().iter().map(|v| v.xy().norm()).fold(0.0, f64::max);
         Self {
             centre: rock.centre,
-            // Four heights below the top a skirt lies below the ground on any slope that a scenario may have.
+            // Four rock heights below the top a skirt is below the ground on any slope that a scenario allows.
             reach_m: outline_m + 4.0 * rock.height_m / steepness + 0.02,
             faces: facets.filter(gentle).chain(skirts).collect(),
         }

@@ -1,13 +1,13 @@
-//! Wheel tracks as one sees them: darker soil, with the slopes of a groove and of cleat marks.
+//! Appearance of wheel tracks: darker soil, with the slopes of a groove and of cleat marks.
 //!
-//! Like all relief finer than the grid of heights, a track tilts the normal for shading and darkens the soil; the
-//! surface that rays meet stays as it was, so that it need not be made anew at every stop.
+//! Like all relief finer than the height grid, a track tilts the shading normal and darkens the soil. The surface that
+//! rays meet is unchanged, so that it need not be rebuilt at every stop.
 //!
-//! **Groove.** All tracks together press the soil once: at a place at distance r from the nearest point of a
-//! wheel's line the groove has the depth below, and where tracks overlap the deepest counts. A line is drawn as a
-//! smooth curve (Catmull–Rom) through the places that the wheel passed, in pieces that bend by little; a corner
-//! sharper than 30° (the wheel stood and was steered) stays one.
-//! **Cleats.** The wheel that passed last leaves its marks along its line. They fade where a picture's samples cannot carry them.
+//! **Groove.** All tracks together press the soil once: at a point at distance r from the nearest point of a wheel's path
+//! the groove has the depth below, and where tracks overlap the deepest counts. A path is a smooth curve (Catmull–Rom)
+//! through the wheel's positions, in nearly straight pieces; a corner sharper than 30° (the wheel stopped and was steered)
+//! is kept.
+//! **Cleats.** The last wheel to pass leaves its marks along its path. They fade where an image cannot resolve them.
 //! ```text
 //! z(r, l) = depth · step((w/2 − r)/EDGE_M) + a CLEAT_M/2 · cos(2π l / CLEAT_SPACING_M),   step(t) = t²(3 − 2t)
 //! a = clamp(2 − c/CLEAT_SPACING_M, 0, 1)
@@ -31,24 +31,24 @@ use nalgebra::Vector2;
 use crate::light::reflection::Appearance;
 use crate::rover::tracks::Tracks;
 
-/// What a track leaves of the soil's albedo.
+/// Albedo of a track over that of the untouched soil.
 const DARKER: f32 = 0.8;
-/// Over which width the groove falls to its depth at each side, m.
+/// Width over which the groove reaches its depth at each side, m.
 const EDGE_M: f64 = 0.03;
-/// Depth of the cleat marks from trough to crest, m, and their distance, m.
+/// Depth of the cleat marks from trough to crest, m, and their spacing, m.
 const CLEAT_M: f64 = 0.003;
 const CLEAT_SPACING_M: f64 = 0.04;
-/// Side of a cell of the map, m.
+/// Side of a cell of the piece grid, m.
 const CELL_M: f64 = 0.125;
-/// Into how many pieces the curve between two places of a wheel is divided where it bends.
+/// Number of pieces into which the curve between two wheel positions is divided where it bends.
 const PIECES: u32 = 4;
-/// The cosine of the angle between curve and chord up to which it is drawn straight: 1°.
+/// Cosine of the angle between curve and chord up to which a curve counts as straight: 1°.
 const STRAIGHT: f64 = 0.999_85;
-/// The cosine of the sharpest corner through which a curve is drawn smoothly.
+/// Cosine of the sharpest corner that is smoothed.
 const SMOOTH_CORNER: f64 = 0.866;
-/// The longest piece between two places of a wheel, m.
+/// Largest distance between consecutive wheel positions of one track, m.
 const GAP_M: f64 = 1.0;
-/// Places within which a wheel's passing counts as one, so that its own neighbouring pieces do not hide each other.
+/// Wheel positions within which a wheel's pass counts as one, so that its own neighbouring pieces do not hide each other.
 const ONE_PASSING: u32 = 3;
 
 /// A straight piece of a track.
@@ -61,36 +61,36 @@ struct Piece {
     /// Length of the track before this piece, m.
     before_m: f64,
     wheel: usize,
-    /// The number of the place of the drive at which it ends, in the order of time.
+    /// Index of the drive position at which it ends, in order of time.
     number: u32,
 }
 
-/// All tracks that a drive leaves, by place.
+/// All tracks of a drive, in a spatial grid.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Laid {
     pieces: Vec<Piece>,
     cells: HashMap<(i32, i32), Vec<u32>>,
     half_width_m: f64,
     depth_m: f64,
-    /// How many places of the drive are passed at each stop.
+    /// Number of drive positions passed at each stop.
     passed: Vec<usize>,
 }
 
-/// The tracks that lie on the ground at one stop.
+/// The tracks on the ground at one stop.
 #[derive(Clone, Debug)]
 pub(crate) struct Imprint {
     laid: Arc<Laid>,
     passed: u32,
 }
 
-/// A piece near a place.
+/// A piece near a point.
 #[derive(Clone, Copy)]
 struct Near<'a> {
     piece: &'a Piece,
-    /// From the nearest point of the piece to the place, m.
+    /// From the nearest point of the piece to the query point, m.
     aside_m: Vector2<f64>,
     r_m: f64,
-    /// How far along the track that nearest point lies, m.
+    /// Distance of the nearest point along the track, m.
     along_m: f64,
 }
 
@@ -108,12 +108,12 @@ impl Laid {
             let mut places: Vec<(u32, Vector2<f64>)> = Vec::with_capacity(line.points_in_site.len());
             for (number, point) in line.points_in_site.iter().enumerate() {
                 let place = Vector2::from(*point);
-                // Where a wheel stood still its line has no direction.
+                // A wheel that does not move gives its path no direction.
                 if places.last().is_none_or(|(_, last)| (place - last).norm() > 1e-9) {
                     places.push((number as u32, place));
                 }
             }
-            // A gap in a recorded way leaves no track.
+            // A gap in a recorded path leaves no track.
             let is_joined = |a: &(u32, Vector2<f64>), b: &(u32, Vector2<f64>)| (b.1 - a.1).norm() <= GAP_M;
             for part in places.chunk_by(is_joined) {
                 laid.add_line(line.wheel, part);
@@ -163,7 +163,7 @@ impl Laid {
         self.pieces.push(piece);
     }
 
-    /// The pieces that were laid before `passed` and cover a place.
+    /// The pieces with numbers below `passed` that cover a point.
     fn near(&self, place_m: Vector2<f64>, passed: u32) -> impl Iterator<Item = Near<'_>> + Clone {
         let cell = ((place_m.x / CELL_M).floor() as i32, (place_m.y / CELL_M).floor() as i32);
         let pieces = self.cells.get(&cell).into_iter().flatten();
@@ -181,7 +181,7 @@ impl Laid {
             })
     }
 
-    /// Gradient of the depth at a place, m per m along x and y; nothing beside the tracks.
+    /// Gradient of the depth at a point along x and y, m/m; `None` beside the tracks.
     fn slope_at(&self, place_m: Vector2<f64>, passed: u32, cutoff_m: f64) -> Option<Vector2<f64>> {
         let near = self.near(place_m, passed);
         let (mut deepest, mut last) = (near.clone().next()?, None::<&Piece>);
@@ -203,7 +203,7 @@ impl Laid {
     }
 }
 
-/// The unit directions in which a wheel arrives at each of its places and leaves it; they differ at corners.
+/// The unit directions of arrival at and departure from each wheel position; they differ at corners.
 fn tangents(places: &[(u32, Vector2<f64>)]) -> Vec<(Vector2<f64>, Vector2<f64>)> {
     let way = |k: usize| (places[k + 1].1 - places[k].1).normalize();
     let last = places.len().saturating_sub(1);
@@ -221,7 +221,7 @@ fn tangents(places: &[(u32, Vector2<f64>)]) -> Vec<(Vector2<f64>, Vector2<f64>)>
         .collect()
 }
 
-/// The cubic from a place with one derivative to another with another, at a part of the way.
+/// Cubic Hermite interpolation between two positions with the given derivatives, at parameter t.
 fn hermite(
     from_m: Vector2<f64>,
     leaving_m: Vector2<f64>,
@@ -237,13 +237,13 @@ fn hermite(
 }
 
 impl Imprint {
-    /// The tracks that lie on the ground when the rover stands at a stop; nothing where none do.
+    /// The tracks on the ground at a stop; `None` if there are none.
     pub(crate) fn at_stop(laid: &Arc<Laid>, stop: usize) -> Option<Self> {
         let passed = laid.passed.get(stop).or(laid.passed.last()).copied().unwrap_or(0);
         (passed > 0).then(|| Self { laid: Arc::clone(laid), passed: passed as u32 })
     }
 
-    /// The soil's look at a place with whatever tracks lie there.
+    /// Modifies the soil's appearance at a point by the tracks there.
     pub(crate) fn on_soil(&self, look: Appearance, x_m: f64, y_m: f64, cutoff_m: f32) -> Appearance {
         let place_m = Vector2::new(x_m, y_m);
         let Some(slope) = self.laid.slope_at(place_m, self.passed, f64::from(cutoff_m)) else {
@@ -315,13 +315,13 @@ mod tests {
 
     #[test]
     fn a_turn_s_track_is_a_ring_without_gaps_notches_or_ridges() {
-        // A wheel on a circle of 0.88 m in steps of 5°, as a turn in place leaves it.
+        // A wheel on a circle of 0.88 m in steps of 5°, as left by a turn in place.
         let ring = (0..=18).map(|k| {
             let (sine, cosine) = (5.0 * f64::from(k)).to_radians().sin_cos();
             [0.88 * cosine, 0.88 * sine]
         });
         let imprint = imprint(&[ring.collect()]);
-        // Its ends have no neighbour to bend towards.
+        // Its ends have no neighbouring piece.
         for tenth in 50..850 {
             let (sine, cosine) = (0.1 * f64::from(tenth)).to_radians().sin_cos();
             let at = |r_m: f64| Vector2::new(r_m * cosine, r_m * sine);
@@ -348,10 +348,10 @@ mod tests {
         let inside = imprint.laid.slope_at(Vector2::new(0.01, 0.065), u32::MAX, 1.0).unwrap();
         assert_eq!(inside, Vector2::zeros());
         assert!((imprint.on_soil(LOOK, 0.0, 0.0, 1.0).albedo - 0.2).abs() < 1e-6);
-        // Cleats run across the second track, the last to be laid: their slope is along y.
+        // The cleats follow the second track, the last one: their slope is along y.
         let cleats = imprint.laid.slope_at(Vector2::new(0.01, 0.01), u32::MAX, 0.0).unwrap();
         assert!(cleats.x == 0.0 && cleats.y.abs() > 0.1, "{cleats:?}");
-        // Before the second wheel came they were those of the first.
+        // Before the second wheel passed, they were those of the first.
         let before = imprint.laid.slope_at(Vector2::new(0.01, 0.01), 3, 0.0).unwrap();
         assert!(before.y == 0.0 && before.x.abs() > 0.1, "{before:?}");
     }

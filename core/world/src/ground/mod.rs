@@ -1,4 +1,4 @@
-//! What there is to see: the ground, its rocks, and how their surfaces look.
+//! The ground, its rocks, and the appearance of their surfaces.
 
 mod value_noise;
 pub(crate) mod level;

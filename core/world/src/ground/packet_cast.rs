@@ -1,9 +1,9 @@
-//! The intersection of the rays of one pixel, or of a few neighbouring ones, with the ground and with rocks, all at once.
+//! Intersection of the rays of one or a few neighbouring pixels with the ground and with rocks, in vector lanes.
 //!
-//! Such rays cross the same few cells. The columns of cells along the axis on which the rays advance most are
-//! visited in order, and in each column the rows that any ray crosses. A cell's patch is the same for all rays, so that its
-//! quadratic (`terrain_cast.rs`) is solved for [`LANES`] rays by one program on vectors. Rays that leave this for any
-//! reason (a long footprint, the edge of the grid) are cast one by one.
+//! Such rays cross the same few cells. The columns of cells along the axis of largest advance are visited in order, and in
+//! each column the rows that any ray crosses. A cell's patch is the same for all rays, so that its quadratic
+//! (`terrain_cast.rs`) is solved for [`LANES`] rays at once. Rays outside this scheme (a long footprint, the edge of the
+//! grid) are cast one by one.
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
@@ -27,7 +27,7 @@ use crate::ground::texture::{LANES, least};
 /// A number for each ray.
 pub(crate) type Lanes = [f64; LANES];
 
-/// The rays of one or a few pixels, by component and lane; lanes without a ray repeat another.
+/// The rays of one or a few pixels, by component and lane; unused lanes repeat another ray.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RayLanes {
     /// Origins, site frame, m.
@@ -42,7 +42,7 @@ const FOOTPRINT_MAX: f64 = 10.0;
 const COLUMNS_MAX: usize = 40;
 const ROWS_MAX: i64 = 8;
 
-/// The rays in cells over the ground without its tilt.
+/// The rays in units of cells over the ground without its tilt.
 struct CellRays {
     p: [Lanes; 2],
     d: [Lanes; 2],
@@ -51,26 +51,26 @@ struct CellRays {
     dz: Lanes,
 }
 
-/// How rays cross a column of cells.
+/// The crossing of a column of cells.
 struct Crossing {
-    /// Where they enter and leave it, m.
+    /// Distances of entry and exit, m.
     enter_m: Lanes,
     leave_m: Lanes,
-    /// The first and the last row that an open ray crosses there.
+    /// First and last row that an open ray crosses there.
     rows: Option<[i64; 2]>,
 }
 
 /// The hits so far.
 struct Found {
-    /// Infinite where there is none yet, m.
+    /// Distance of the nearest hit, m; infinite if there is none yet.
     hit_m: Lanes,
-    /// Up to where a ray is known to be above the ground, m.
+    /// Distance up to which a ray is known to be above the ground, m.
     open_from_m: Lanes,
-    /// Whether a ray may still be hit.
+    /// Whether a ray may still hit.
     is_open: [bool; LANES],
 }
 
-/// A cell's patch `z00 + a u + b v + c u v` at its place in the grid.
+/// A cell's patch `z00 + a u + b v + c u v` at its position in the grid.
 struct Patch {
     cell: [f64; 2],
     z00: f64,
@@ -137,7 +137,7 @@ impl Terrain {
                 cell.p[k][lane] = (rays.origin[k][lane] - self.origin_m[k]) * scale;
                 let d = rays.direction[k][lane] * scale;
                 cell.d[k][lane] = d;
-                // A ray along a row never leaves it: a tiny slope stands for none.
+                // A ray along a row never leaves it: a tiny slope replaces zero.
                 cell.inverse[k][lane] = 1.0 / if d.abs() < 1e-12 { 1e-12 } else { d };
             }
         }
@@ -190,7 +190,7 @@ impl Terrain {
 }
 
 impl CellRays {
-    /// The column of the ray that has advanced least at `clear_m`; `None` where the rays advance in both directions.
+    /// The column of the ray that has advanced least at `clear_m`; `None` if the rays advance in both directions.
     #[inline(always)]
     fn rearmost_column(&self, major: usize, is_forward: bool, clear_m: f64) -> Option<i64> {
         let (mut rear, mut turns) = ([0.0; LANES], false);
@@ -203,7 +203,7 @@ impl CellRays {
         (!turns).then(|| (if is_forward { rear } else { -rear }).floor() as i64)
     }
 
-    /// How the rays cross the column between two borders.
+    /// The crossing of the column between two borders.
     #[inline(always)]
     fn cross(
         &self,
@@ -235,7 +235,7 @@ impl CellRays {
 }
 
 impl Found {
-    /// Closes the rays that were hit, or that end, before they leave a column; whether any stays open.
+    /// Closes the rays that hit, or end, before they leave a column; returns whether any stays open.
     #[inline(always)]
     fn close(&mut self, leave_m: &Lanes, to_m: &Lanes) -> bool {
         let mut any_open = false;
@@ -252,7 +252,7 @@ impl Found {
 }
 
 impl Patch {
-    /// Lowers `hit_m` to where rays within the column first are on or below the patch, if they are.
+    /// Lowers `hit_m` to the first distance within the column at which a ray is on or below the patch.
     #[inline(always)]
     fn meet(&self, rays: &CellRays, minor: usize, crossing: &Crossing, hit_m: &mut Lanes) {
         let (enter_m, leave_m) = (&crossing.enter_m, &crossing.leave_m);
@@ -277,13 +277,13 @@ impl Patch {
             let (t, d) = (from_m[lane], [rays.d[0][lane], rays.d[1][lane]]);
             let u = rays.p[0][lane] + d[0] * t - self.cell[0];
             let v = rays.p[1][lane] + d[1] * t - self.cell[1];
-            // F(s) = q0 + q1 s + q2 s², s measured from where the ray enters.
+            // F(s) = q0 + q1 s + q2 s², s measured from the point of entry.
             let q0 =
                 rays.z_m[lane] + rays.dz[lane] * t - (self.z00 + self.a * u + self.b * v + self.c * u * v);
             let q1 = rays.dz[lane] - (self.a * d[0] + self.b * d[1] + self.c * (u * d[1] + v * d[0]));
             let q2 = -self.c * d[0] * d[1];
             let discriminant = q1 * q1 - 4.0 * q2 * q0;
-            // Both roots without cancellation; that of a plane is the second, the first then being infinite.
+            // Both roots without cancellation; a plane has only the second, and the first is then infinite.
             let w = -0.5 * (q1 + discriminant.max(0.0).sqrt().copysign(q1));
             let [first, second] = [w / q2, q0 / w];
             let positive = |s: f64| if s > 0.0 { s } else { f64::INFINITY };
@@ -297,10 +297,9 @@ impl Patch {
 }
 
 impl Rock {
-    /// Where rays from one point outside the rock enter it, m, infinite where they miss it, and the planes through which they
-    /// do.
+    /// Distances at which rays from one point outside the rock enter it, m (infinite for a miss), and the planes of entry.
     ///
-    /// With s = 1/t the distance from the origin to a plane divides once for all rays: t is largest where s is least.
+    /// With s = 1/t the distance from the origin to a plane divides once for all rays: t is largest where s is smallest.
     #[inline(always)]
     pub(crate) fn enter_lanes(&self, origin: &Point3, directions: &[Lanes; 3]) -> (Lanes, [usize; LANES]) {
         let from_centre = origin - self.centre;
@@ -328,8 +327,8 @@ impl Rock {
         (enter, planes)
     }
 
-    /// For rays of one direction from many points: where they enter and leave the rock, m; the leaving distance is less than
-    /// the entering one where they miss it.
+    /// Distances at which rays of one direction from many points enter and leave the rock, m; for a miss the exit distance
+    /// is smaller than the entry distance.
     #[inline(always)]
     pub(crate) fn passage_lanes(&self, points: &[Lanes; 3], direction: &Vector3) -> [Lanes; 2] {
         let (mut enter_m, mut leave_m) = ([f64::NEG_INFINITY; LANES], [f64::INFINITY; LANES]);

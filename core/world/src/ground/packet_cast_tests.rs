@@ -1,16 +1,16 @@
-//! Rays cast together hit as each alone.
+//! Rays cast in lanes hit as each ray does alone.
 
 use super::*;
 use crate::ground::rocks::RockSeed;
 use crate::ground::texture::mix;
 use crate::scenario::{RockShape, TerrainSettings};
 
-/// Numbers in [0, 1).
+/// A number in [0, 1).
 fn unit(seed: u64, n: u64) -> f64 {
     (mix(seed * 64 + n) >> 11) as f64 / (1u64 << 53) as f64
 }
 
-/// The rays of a square pixel of a width, rad, from a height over the ground of a place.
+/// The rays of a square pixel of angular width `width_rad`, from 1 to 2 m above a point of the ground.
 fn pixel(terrain: &Terrain, seed: u64, pitch_rad: f64, width_rad: f64) -> (RayLanes, Cone) {
     let (x, y) = (-1.0 + 4.0 * unit(seed, 0), -3.0 + 6.0 * unit(seed, 1));
     let origin = Point3::new(x, y, terrain.z_at(x, y) - 1.0 - unit(seed, 2));
@@ -29,7 +29,7 @@ fn pixel(terrain: &Terrain, seed: u64, pitch_rad: f64, width_rad: f64) -> (RayLa
             (rays.origin[k][lane], rays.direction[k][lane]) = (origin[k], direction[k]);
         }
     }
-    // Half a percent of a pixel covers that lines of equal pitch are no great circles.
+    // Half a percent of a pixel allows for lines of equal pitch not being great circles.
     (rays, Cone::around(corners.iter(), 0.005 * width_rad).unwrap())
 }
 

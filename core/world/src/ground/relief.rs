@@ -1,20 +1,19 @@
-//! The relief of the ground: a fractal of stated roughness, and ripples of sand on it.
+//! The relief of the ground: a fractal of given roughness, and sand ripples on it.
 //!
-//! **Fractal.** Octaves of value noise with amplitude ∝ λ^H, so that the RMS difference of height grows as
-//! distance^H (domain.md 10.4: H = 0.8, 2 cm at 1 m). The sum is scaled by its own expected RMS difference at 1 m,
-//! computed and not fitted: an octave of wavelength λ and variance σ² contributes `2σ² (1 − ρ(1 m/λ))`, with the
-//! correlation ρ of value noise, `ρ(s) = mean over angle of c(s cos) c(s sin)`, where c(s) is that of two
-//! lattice numbers joined by the quintic, s apart along a line. So the stated roughness holds for every cell,
-//! exponent and longest wavelength, and ripples come on top of it.
+//! **Fractal.** Octaves of value noise with amplitude ∝ λ^H, so that the RMS difference of height grows as distance^H
+//! (domain.md 10.4: H = 0.8, 2 cm at 1 m). The sum is scaled by its own expected RMS difference at 1 m, computed and not
+//! fitted: an octave of wavelength λ and variance σ² contributes `2σ² (1 − ρ(1 m/λ))`, with the correlation ρ of value
+//! noise, `ρ(s) = mean over angle of c(s cos) c(s sin)`, where c(s) is that of value noise along a line between points s
+//! lattice constants apart. So the given roughness holds for every cell size, exponent and longest wavelength; ripples are
+//! added to it.
 //!
-//! The octaves longer than the longest would each add to the difference over a short distance as a tilt does, by
-//! λ^{2H−2}: a geometric series with ratio q = 1.8^{2H−2}, whose sum q/(1 − q) would be missing and would flatten the
-//! power law. For H < 1 one more octave of the longest wavelength, the swell, carries it.
+//! Each missing octave above the longest wavelength would act like a tilt over a short distance and contribute λ^{2H−2}: a
+//! geometric series with ratio q = 1.8^{2H−2} and sum q/(1 − q), without which the power law would flatten. For H < 1 one
+//! more octave of the longest wavelength, the swell, has this variance.
 //!
-//! **Ripples.** `z = −h/2 · m · p(2π s/λ_r + φ)`, s along the ripples' azimuth, `p(x) = cos x + cos(2x)/4`: sharp
-//! crests, flat troughs, h from trough to crest. The phase φ is noise of 1.6 rad (1σ) over four to eight
-//! wavelengths, which makes crests wind and meet; m is noise about 1 that leaves gaps and stays within 0.4 and 1.6.
-//! They are not strictly periodic.
+//! **Ripples.** `z = −h/2 · m · p(2π s/λ_r + φ)`, s along the ripples' azimuth, `p(x) = cos x + cos(2x)/4`: sharp crests,
+//! flat troughs, h from trough to crest. The phase φ is noise of 1.6 rad (1σ) over four to eight wavelengths, which makes
+//! crests wind and meet; m is noise about 1 within 0.4 and 1.6 that leaves gaps. The ripples are not strictly periodic.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -33,7 +32,7 @@ const RATIO: f64 = 1.8;
 /// 1σ of the ripples' phase, rad.
 const PHASE_STD_RAD: f64 = 1.6;
 
-/// Heights relative to the mean plane.
+/// Heights relative to the mean plane, positive down.
 pub(super) struct Relief {
     fractal: Octaves<2>,
     swell: Octaves<2>,
@@ -50,7 +49,7 @@ struct Ripples {
 }
 
 impl Relief {
-    /// The relief of the settings.
+    /// Builds the relief from its settings.
     pub(super) fn new(settings: &TerrainSettings, seed: u64) -> Self {
         let octaves = fractal_octaves(settings);
         let amplitude_m = settings.rms_at_1m_m / rms_difference(&octaves, 1.0);
@@ -65,7 +64,7 @@ impl Relief {
         Self { fractal, swell, amplitude_m, ripples }
     }
 
-    /// Height over the mean plane at a place, m down.
+    /// z of the relief at a point relative to the mean plane, m, positive down.
     pub(super) fn z_m(&self, x_m: f64, y_m: f64) -> f64 {
         let noise =
             [&self.fractal, &self.swell].map(|octaves| f64::from(octaves.at([x_m, y_m], 1e-6).albedo));
@@ -105,7 +104,7 @@ impl Ripples {
     }
 }
 
-/// The octaves of the fractal, of unit standard deviation in all.
+/// The octaves of the fractal, with unit standard deviation in total.
 fn fractal_octaves(settings: &TerrainSettings) -> OctaveSettings {
     let shortest_m = 3.0 * settings.cell_m;
     OctaveSettings {
@@ -118,7 +117,7 @@ fn fractal_octaves(settings: &TerrainSettings) -> OctaveSettings {
     }
 }
 
-/// The wavelengths of the octaves, m, and their variances relative to that of the longest.
+/// The wavelengths of the octaves, m, and their variances relative to that of the longest one.
 fn variances(octaves: &OctaveSettings) -> impl Iterator<Item = (f64, f64)> {
     let OctaveSettings { longest_m, shortest_m, ratio, albedo_exponent, .. } = *octaves;
     std::iter::successors(Some(longest_m), move |w| Some(w / ratio))
@@ -126,7 +125,7 @@ fn variances(octaves: &OctaveSettings) -> impl Iterator<Item = (f64, f64)> {
         .map(move |w| (w, (w / longest_m).powf(2.0 * albedo_exponent)))
 }
 
-/// Variance of the swell, where all octaves together have the variance 1 (header).
+/// Variance of the swell for unit variance of all octaves together (header).
 fn swell_variance(octaves: &OctaveSettings) -> f64 {
     let q = octaves.ratio.powf(2.0 * octaves.albedo_exponent - 2.0);
     if q >= 0.999 {
@@ -135,8 +134,7 @@ fn swell_variance(octaves: &OctaveSettings) -> f64 {
     q / (1.0 - q) / variances(octaves).map(|(_, variance)| variance).sum::<f64>()
 }
 
-/// The expected RMS difference of the fractal between two places a distance apart, where all octaves together
-/// have the variance 1.
+/// Expected RMS difference of the fractal between points `distance_m` apart, for unit variance of all octaves together.
 fn rms_difference(octaves: &OctaveSettings, distance_m: f64) -> f64 {
     let all: f64 = variances(octaves).map(|(_, variance)| variance).sum();
     let part =
@@ -146,7 +144,7 @@ fn rms_difference(octaves: &OctaveSettings, distance_m: f64) -> f64 {
     (octaves_sum + part(octaves.longest_m, swell_variance(octaves))).sqrt()
 }
 
-/// Correlation of two-dimensional value noise between places `s` lattice constants apart, over all directions.
+/// Correlation of two-dimensional value noise between points `s` lattice constants apart, over all directions.
 fn correlation(s: f64) -> f64 {
     const ANGLES: u32 = 32;
     let variance = along_line(0.0).powi(2);
@@ -157,7 +155,7 @@ fn correlation(s: f64) -> f64 {
     sum / f64::from(ANGLES) / variance
 }
 
-/// What two places `s` ≥ 0 apart on a line share of their lattice numbers, on average over the first place.
+/// Mean overlap of the interpolation weights of two points `s` ≥ 0 lattice constants apart on a line.
 fn along_line(s: f64) -> f64 {
     const STEPS: u32 = 128;
     let fade = |t: f64| t * t * t * (t * (t * 6.0 - 15.0) + 10.0);
@@ -181,7 +179,7 @@ fn along_line(s: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// RMS difference over `distance_m`, over many seeds, places and directions.
+    /// RMS difference over `distance_m`, over many seeds, points and directions.
     fn measured(settings: &TerrainSettings, distance_m: f64) -> f64 {
         let (mut sum, mut count) = (0.0f64, 0.0);
         for seed in 0..60 {
@@ -231,7 +229,7 @@ mod tests {
         let (sin, cos) = 30f64.to_radians().sin_cos();
         let line: Vec<f64> =
             (0..20_000).map(|k| relief.z_m(f64::from(k) * 5e-3 * cos, f64::from(k) * 5e-3 * sin)).collect();
-        // Crests are tops (least z); the line is 100 m long.
+        // Crests are tops (smallest z); the line is 100 m long.
         let crests: Vec<usize> =
             (1..line.len() - 1).filter(|&k| line[k] < line[k - 1] && line[k] <= line[k + 1]).collect();
         assert!((crests.len() as f64 / 200.0 - 1.0).abs() < 0.03, "{}", crests.len());
@@ -246,7 +244,7 @@ mod tests {
             .collect();
         let mean = heights.iter().sum::<f64>() / heights.len() as f64;
         assert!((mean / 0.03 - 1.0).abs() < 0.15, "{mean}");
-        // Along the crests nothing changes fast.
+        // Along the crests the height varies slowly.
         let along = (0..2000).map(|k| relief.z_m(-f64::from(k) * 5e-3 * sin, f64::from(k) * 5e-3 * cos));
         let along: Vec<f64> = along.collect();
         let steepest = along.windows(2).map(|pair| (pair[1] - pair[0]).abs() / 5e-3).fold(0.0, f64::max);

@@ -1,21 +1,19 @@
-//! Where the rocks lie: the size distribution of Golombek & Rapp, and dart throwing.
+//! Positions and sizes of rocks: the size distribution of Golombek & Rapp, and dart throwing.
 //!
 //! The fraction of the area covered by rocks of diameter D or more is F(D) = k e^{−qD} with
 //! q = 1.79 + 0.152/k; from −dF/dD = (π D²/4) n(D) follows their number per m² (domain.md 10.1):
-//! `N(≥D) = (4 k q/π) [e^{−qD}/D − q E1(qD)]`. The number in an area is Poisson; diameters are drawn by
-//! inverting N. Rocks are placed from the largest to the smallest; a place that overlaps one that is taken
-//! is drawn again near by (elsewhere, small rocks would crowd the bare tracks), and a rock that finds no place in
-//! 60 draws is left out. A rock whose place lies in the rover's way is left out at once, so that beside the tracks the
-//! law holds. Rocks that the scenario places come first.
+//! `N(≥D) = (4 k q/π) [e^{−qD}/D − q E1(qD)]`. The number in an area is Poisson; diameters are drawn by inverting N. Rocks
+//! are placed from the largest to the smallest. A position that overlaps an earlier rock is redrawn near by (elsewhere,
+//! small rocks would crowd the bare tracks), and a rock without a free position after 60 draws is left out. A rock in the
+//! rover's path is left out at once, so that the law holds beside the tracks. Rocks that the scenario places come first.
 //!
-//! Heights are `ratio · D + offset` on average (domain.md 10.3); four kinds of rocks differ about it.
+//! Heights are `ratio · D + offset` on average (domain.md 10.3); the four kinds of rocks vary about it.
 //!
-//! Rocks are scattered over the wedge that the cameras see, in strips across the drive; the smallest
-//! diameter grows slowly beyond the goal, where smaller ones would span less than about four pixels. Around
-//! the goal a cluster follows the same law with a larger smallest diameter. The wheels' lines of the
-//! planned drive are kept free of all but pebbles, and between them nothing is higher than the rover's belly, unless
-//! `rocks.off_planned_drive` is false: then the rocks do not depend on the drive. `rocks.clear_path` removes
-//! further rocks once all are placed (`clear_path.rs`).
+//! Rocks are scattered over the wedge that the cameras see, in strips across the drive; the smallest diameter grows slowly
+//! beyond the goal, where smaller rocks would span less than about four pixels. Around the goal a cluster follows the same
+//! law with a larger smallest diameter. The wheel paths of the planned drive are kept free of all but pebbles, and between
+//! them no rock is higher than the rover's belly, unless `rocks.off_planned_drive` is false: then the rocks do not depend
+//! on the drive. `rocks.clear_path` removes further rocks after all are placed (`clear_path.rs`).
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -41,33 +39,33 @@ use crate::scenario::{RockSettings, RockShape};
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
 
-/// Inner and outer edge of the wheels' tracks, m from the middle line (domain.md 5.4, wheel 16 cm wide).
+/// Inner and outer edge of the wheel tracks, m from the centre line (domain.md 5.4, wheel 16 cm wide).
 const TRACK_Y_M: [f64; 2] = [0.43, 0.70];
 /// The highest rock that passes below the rover's belly, m (ours).
 const BELLY_M: f64 = 0.20;
-/// Where the scatter of rocks starts, m ahead of the first stop: nearer ground is never seen.
+/// Start of the scattered rocks, m ahead of the first stop: nearer ground is never seen.
 const NEAREST_M: f64 = 1.5;
-/// The highest stone that is left in the wheels' way: they roll over it (`footing.rs`), m (ours).
+/// Height of the highest stone left in the wheels' path, m: they roll over it (`footing.rs`; ours).
 const ROLLED_OVER_M: f64 = 0.025;
-/// Radius of a rock over its diameter: an outline is longer than its disc.
+/// Largest radius of a rock's outline over its diameter.
 const REACH: f64 = 0.6;
-/// By how much the surroundings in which a rock looks for a free place grow with every draw, m.
+/// Growth per draw of the square in which a free position is drawn, m.
 const NUDGE_M: f64 = 0.02;
-/// Draws of a place before a rock is left out.
+/// Number of draws of a position before a rock is left out.
 const DRAWS: usize = 60;
 
-/// What the placing of rocks must know of the drive, site frame.
+/// Properties of the drive that the placement of rocks depends on, site frame.
 #[derive(Clone, Debug)]
 pub(crate) struct Approach {
     /// The point that the rover approaches, m.
     pub goal_m: [f64; 2],
-    /// How far along x the front wheels get, m.
+    /// Largest x of the front wheels, m.
     pub wheels_reach_m: f64,
-    /// Where a drive of moves looks and goes; nothing for a straight approach along x.
+    /// View and wheel paths of a drive of moves; `None` for a straight approach along x.
     pub around: Option<Around>,
 }
 
-/// The smallest rock worth placing this far beyond the goal, m: at least about four pixels as seen from the start.
+/// Diameter of the smallest rock worth placing this far beyond the goal, m: about four pixels as seen from the start.
 fn smallest_m(settings: &RockSettings, beyond_goal_m: f64) -> f64 {
     settings.smallest_m.max(0.0045 * beyond_goal_m)
 }
@@ -77,10 +75,10 @@ fn half_width_m(x_m: f64) -> f64 {
     2.0 + 0.46 * x_m
 }
 
-/// A rock that wants a place.
+/// A rock to be placed.
 struct Candidate {
     diameter_m: f64,
-    /// Rectangle (x from, to; half width), disc or ring about the goal.
+    /// Strip, disc or ring to draw its position from.
     place: Place,
 }
 
@@ -126,7 +124,7 @@ pub(crate) fn scatter(
             continue;
         }
         if scattered && is_in_the_way(place, reach_m, height_m) {
-            // Drawing again would crowd what lies beside the tracks; a rock of the cluster must find a place.
+            // Redrawing would crowd the ground beside the tracks; a rock of the cluster must find a position.
             continue;
         }
         let first = place;
@@ -171,7 +169,7 @@ fn off_clear_path(seeds: Vec<RockSeed>, settings: &RockSettings, approach: &Appr
     kept.map(|(_, rock)| rock).collect()
 }
 
-/// The rocks that the scenario places by hand.
+/// The rocks that the scenario places individually.
 fn placed_seeds(settings: &RockSettings, approach: &Approach, seed: u64) -> Vec<RockSeed> {
     let grown = settings.placed.iter().enumerate().map(|(index, rock)| RockSeed {
         x_m: approach.goal_m[0] + rock.x_m,
@@ -185,10 +183,10 @@ fn placed_seeds(settings: &RockSettings, approach: &Approach, seed: u64) -> Vec<
     grown.collect()
 }
 
-/// The kind of a rock and its visible height, m: mean (ratio · D + offset), by kind and ± 25 % (ours).
+/// Draws the kind of a rock and its visible height, m: the mean (ratio · D + offset), by kind and ± 25 % (ours).
 fn draw_shape(settings: &RockSettings, diameter_m: f64, random: &mut Pcg64) -> (RockShape, f64) {
     let kind: f64 = random.random();
-    // Parts 0.40, 0.25, 0.15 and 0.20; the factors' mean is 1.
+    // Fractions 0.40, 0.25, 0.15 and 0.20; the factors' mean is 1.
     let (shape, factor) = match kind {
         k if k < 0.40 => (RockShape::Angular, 1.05),
         k if k < 0.65 => (RockShape::Block, 1.10),
@@ -199,7 +197,7 @@ fn draw_shape(settings: &RockSettings, diameter_m: f64, random: &mut Pcg64) -> (
     (shape, mean_m * factor * random.random_range(0.75..1.25))
 }
 
-/// All rocks that want a place: the cluster and the strips.
+/// All rocks to be placed: the cluster and the strips.
 fn candidates(settings: &RockSettings, approach: &Approach, random: &mut Pcg64) -> Vec<Candidate> {
     let k = settings.area_fraction.max(0.01);
     let mut candidates = Vec::new();
@@ -218,7 +216,8 @@ fn candidates(settings: &RockSettings, approach: &Approach, random: &mut Pcg64) 
         let from_m = nearest_m + strip as f64;
         let to_m = from_m + 1.0;
         let beyond_goal_m = approach.around.as_ref().map_or(from_m - approach.goal_m[0], |around| {
-            // Among the stops pebbles lie as near as at the goal; twice as far the rule of the distance holds.
+            // Near the stops the smallest pebbles are those at the goal; from twice that distance the rule by distance
+            // applies.
             from_m.min(2.0 * (from_m - around.reach_m()))
         });
         let smallest = smallest_m(settings, beyond_goal_m);
@@ -242,7 +241,7 @@ fn candidates(settings: &RockSettings, approach: &Approach, random: &mut Pcg64) 
     candidates
 }
 
-/// A place drawn evenly over the strip or the disc.
+/// Draws a position uniformly over the strip, the disc or the ring.
 fn draw_place(place: &Place, approach: &Approach, random: &mut Pcg64) -> [f64; 2] {
     match *place {
         Place::Strip { from_m, to_m } => {
@@ -254,7 +253,7 @@ fn draw_place(place: &Place, approach: &Approach, random: &mut Pcg64) -> [f64; 2
     }
 }
 
-/// A place drawn evenly between two circles.
+/// Draws a position uniformly between two circles.
 fn draw_in_ring(middle_m: [f64; 2], [from_m, to_m]: [f64; 2], random: &mut Pcg64) -> [f64; 2] {
     let part: f64 = random.random();
     let r = (from_m * from_m + part * (to_m * to_m - from_m * from_m)).sqrt();
@@ -262,12 +261,12 @@ fn draw_in_ring(middle_m: [f64; 2], [from_m, to_m]: [f64; 2], random: &mut Pcg64
     [middle_m[0] + r * angle.cos(), middle_m[1] + r * angle.sin()]
 }
 
-/// A place within a square around another.
+/// Draws a position within a square around a point.
 fn beside([x_m, y_m]: [f64; 2], by_m: f64, random: &mut Pcg64) -> [f64; 2] {
     [x_m + random.random_range(-by_m..by_m), y_m + random.random_range(-by_m..by_m)]
 }
 
-/// Whether a rock would stand in a wheel's track or touch the belly.
+/// Whether a rock would be in a wheel's track or touch the belly.
 fn is_in_the_way(approach: &Approach, [x_m, y_m]: [f64; 2], reach_m: f64, height_m: f64) -> bool {
     if let Some(around) = &approach.around {
         return height_m > ROLLED_OVER_M && around.is_in_the_way(x_m, y_m, reach_m, height_m > BELLY_M);
@@ -278,13 +277,13 @@ fn is_in_the_way(approach: &Approach, [x_m, y_m]: [f64; 2], reach_m: f64, height
     x_m - reach_m < approach.wheels_reach_m && !beside && !between && height_m > ROLLED_OVER_M
 }
 
-/// The places that are taken, in a coarse grid so that a look-up stays short.
+/// The outlines of the placed rocks, in a coarse grid for short look-ups.
 struct Taken {
     cells: std::collections::HashMap<(i32, i32), Vec<[f64; 3]>>,
 }
 
 impl Taken {
-    /// Side of a cell, m: two of the largest rocks that a scenario allows (2 m) do not reach farther.
+    /// Side of a cell, m: larger than the distance at which two of the largest allowed rocks (2 m) overlap.
     const CELL_M: f64 = 2.4;
 
     fn new() -> Self {

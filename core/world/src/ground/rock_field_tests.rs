@@ -19,7 +19,7 @@ fn rocks_near_the_approach_follow_the_distribution() {
     let (mut counted, mut area_m2) = ([0.0; 3], 0.0);
     for seed in 0..10 {
         for rock in field(&settings, seed) {
-            // Outside the tracks, where nothing was kept free.
+            // Outside the tracks, which are kept free.
             let (x, y) = (rock.centre.x, rock.centre.y.abs());
             if (2.5..8.5).contains(&x) && (1.4..3.0).contains(&y) {
                 counted[0] += f64::from(rock.diameter_m >= 0.02);
@@ -48,7 +48,7 @@ fn heights_follow_the_line_and_all_kinds_occur() {
                 count += 1.0;
             }
         }
-        // One rock differs by a fifth; 1σ of the mean is below 1 %.
+        // Single rocks vary by a fifth; 1σ of the mean is below 1 %.
         assert!(count > 400.0 && (over / count - 1.0f64).abs() < 0.03, "{count} {}", over / count);
         assert!((slabs / count - 0.15f64).abs() < 0.05, "{}", slabs / count);
     }
@@ -99,7 +99,7 @@ fn a_clear_path_removes_the_rocks_on_it_and_leaves_all_others_as_they_were() {
         let others: Vec<Point3> = before.iter().filter(|rock| !in_strip(rock)).map(|r| r.centre).collect();
         assert_eq!(after.iter().map(|rock| rock.centre).collect::<Vec<_>>(), others);
         removed += before.len() - after.len();
-        // Pebbles on the path and the rocks beyond its end are still there.
+        // Pebbles on the path and the rocks beyond its end remain.
         assert!(after.iter().any(|rock| (3.0..7.0).contains(&rock.centre.x) && rock.centre.y.abs() < 0.4));
         let near = |rock: &&Rock| (rock.centre.x - 10.3).hypot(rock.centre.y) < 1.5;
         assert!(after.iter().filter(near).filter(|rock| rock.diameter_m >= 0.25).count() >= 8);

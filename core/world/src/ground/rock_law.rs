@@ -1,4 +1,4 @@
-//! How many rocks of which size: the law of Golombek & Rapp.
+//! Number density of rocks by size: the law of Golombek & Rapp.
 //!
 //! The fraction of the area covered by rocks of diameter D or more is F(D) = k e^{−qD} with q = 1.79 + 0.152/k; from
 //! −dF/dD = (π D²/4) n(D) follows their number per m²: `N(≥D) = (4 k q/π) [e^{−qD}/D − q E1(qD)]`. Diameters are
@@ -32,7 +32,7 @@ fn exponential_integral(x: f64) -> f64 {
     (-x).exp() / (x + fraction)
 }
 
-/// Rocks of diameter `diameter_m` or more per m².
+/// Number of rocks of diameter `diameter_m` or more per m².
 pub fn number_per_m2(area_fraction: f64, diameter_m: f64) -> f64 {
     if area_fraction <= 0.0 {
         return 0.0;
@@ -42,7 +42,7 @@ pub fn number_per_m2(area_fraction: f64, diameter_m: f64) -> f64 {
     4.0 * area_fraction * q / std::f64::consts::PI * ((-x).exp() / diameter_m - q * exponential_integral(x))
 }
 
-/// A diameter between the two limits, from a number in [0, 1).
+/// Maps a uniform number in [0, 1) to a diameter between the two limits, m.
 pub(crate) fn draw_diameter_m(area_fraction: f64, smallest_m: f64, largest_m: f64, unit: f64) -> f64 {
     let (most, least) = (number_per_m2(area_fraction, smallest_m), number_per_m2(area_fraction, largest_m));
     let wanted = most + unit * (least - most);

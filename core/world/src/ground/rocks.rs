@@ -1,12 +1,12 @@
-//! Rocks: convex polyhedra, met by rays exactly.
+//! Rocks: convex polyhedra with exact ray intersection.
 //!
-//! **Size.** D is the diameter of the disc that covers as much ground as the rock's outline seen from above, so that
-//! the area that rocks cover is that of the size distribution; the visible height is H. A shape (`shape.rs`) is
-//! tilted by up to 15°, turned by any yaw and stretched to D and H exactly. A placed rock is not tilted, and D is its
-//! width across the direction in which its face looks.
+//! **Size.** D is the diameter of the disc with the area of the rock's outline seen from above, so that the area that
+//! rocks cover is that of the size distribution; the visible height is H. A shape (`shape.rs`) is tilted by up to 15°,
+//! rotated by any yaw and stretched to D and H exactly. A placed rock is not tilted, and D is its width across the
+//! direction that its face points in.
 //!
-//! **Burial.** A part β of the full height lies below the ground, so the full height is H/(1 − β). On a slope the
-//! rock stands along the normal of the mean plane, as if it had been buried before the ground was tilted.
+//! **Burial.** A fraction β of the full height is below the ground, so the full height is H/(1 − β). On a slope the rock
+//! is aligned with the normal of the mean plane, as if it had been buried before the ground was tilted.
 //!
 //! **Intersection.** Along a ray, n·(o + t d) ≤ h is a half-line in t for each plane; their intersection is
 //! an interval [enter, leave], empty when the ray misses. Nothing is approximated.
@@ -31,26 +31,26 @@ use crate::ground::shape::{Plane, Polyhedron};
 use crate::scenario::RockShape;
 use sightline_geometry::frames::{Point3, Ray, Vector3};
 
-/// A rock standing in the site.
+/// A rock in the site frame.
 #[derive(Clone, Debug)]
 pub struct Rock {
     /// Origin of the planes, inside the rock, site frame, m.
     pub centre: Point3,
-    /// Diameter of the disc of the same area seen from above; of a placed rock its width, m.
+    /// Diameter of the disc of the same area seen from above, m; for a placed rock its width.
     pub diameter_m: f64,
-    /// Height above the ground at the rock's place, m.
+    /// Height above the ground at the rock's position, m.
     pub height_m: f64,
-    /// Radius of a sphere about the centre that holds the rock, m.
+    /// Radius of a bounding sphere about the centre, m.
     pub radius_m: f64,
     /// The kind of polyhedron.
     pub shape: RockShape,
-    /// How its surface differs from that of other rocks.
+    /// Appearance relative to other rocks.
     pub look: RockLook,
     planes: Vec<Plane>,
     vertices: Vec<Vector3>,
 }
 
-/// How the surface of one rock differs from that of others.
+/// Appearance of one rock relative to others.
 #[derive(Clone, Copy, Debug)]
 pub struct RockLook {
     /// Albedo relative to the mean of all rocks.
@@ -59,27 +59,27 @@ pub struct RockLook {
     pub veins: f32,
     /// Strength of pits, 0 to 1; most rocks have none.
     pub pits: f32,
-    /// Where in the noise the rock's texture is taken, m.
+    /// Offset of the rock's texture coordinates in the noise, m.
     pub texture_shift_m: [f64; 3],
 }
 
-/// Where a ray is inside a rock.
+/// The interval of a ray inside a rock.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
-    /// Where the ray enters, m; negative infinity never occurs because rocks are bounded.
+    /// Distance of the entry, m; always finite because rocks are bounded.
     pub enter_m: f64,
-    /// Where it leaves, m.
+    /// Distance of the exit, m.
     pub leave_m: f64,
-    /// The plane through which it enters.
+    /// Index of the plane of entry.
     pub plane: usize,
 }
 
-/// What a rock is grown from.
+/// Parameters from which a rock is grown.
 #[derive(Clone, Copy, Debug)]
 pub struct RockSeed {
-    /// Place in the site frame, m.
+    /// x in the site frame, m.
     pub x_m: f64,
-    /// Place in the site frame, m.
+    /// y in the site frame, m.
     pub y_m: f64,
     /// Diameter, or width of a placed rock, m.
     pub diameter_m: f64,
@@ -87,14 +87,14 @@ pub struct RockSeed {
     pub height_m: f64,
     /// The kind of polyhedron.
     pub shape: RockShape,
-    /// Where the face of a placed rock looks, rad clockwise from above, 0 ahead; nothing for scattered rocks.
+    /// Direction of the face of a placed rock, rad clockwise from above, 0 ahead; `None` for scattered rocks.
     pub face_yaw_rad: Option<f64>,
-    /// Where the rock's own stream of random numbers starts.
+    /// Seed of the rock's own random numbers.
     pub seed: u64,
 }
 
 impl Rock {
-    /// Grows a rock on ground of height `ground_z_m` (m down) whose mean plane has the unit normal `up` (site).
+    /// Grows a rock on ground at `ground_z_m` (m, positive down) whose mean plane has the unit normal `up` (site frame).
     pub fn grow(from: &RockSeed, ground_z_m: f64, up: &Vector3) -> Self {
         let mut random = Pcg64::new(u128::from(from.seed), 0x0a02_bdbf_7bb3_c0a7);
         let burial = random.random_range(0.10..0.40);
@@ -109,7 +109,7 @@ impl Rock {
         let stand = Rotation3::rotation_between(&-Vector3::z(), up).unwrap_or_else(Rotation3::identity);
         let body = body.turned(&stand);
         let from_base = stand * Vector3::new(0.0, 0.0, -from.height_m - top_m);
-        // Room for rounding: a ray through the farthest vertex must pass the test against the sphere.
+        // Margin for rounding: a ray through the farthest vertex must pass the test against the sphere.
         let radius_m = body.vertices.iter().map(Vector3::norm).fold(0.0, f64::max) * (1.0 + 1e-9);
         Self {
             centre: Point3::new(from.x_m, from.y_m, ground_z_m) + from_base,
@@ -123,7 +123,7 @@ impl Rock {
         }
     }
 
-    /// Where a ray is inside the rock, or nothing where it misses it. The ray is a whole line here.
+    /// Returns the interval inside the rock, or `None` if the ray misses it. The ray counts as an infinite line here.
     #[inline(always)]
     pub fn interval(&self, ray: &Ray) -> Option<Interval> {
         let from_centre = ray.origin - self.centre;
@@ -162,17 +162,17 @@ impl Rock {
         self.planes[plane].normal
     }
 
-    /// The planes that bound it.
+    /// The bounding planes.
     pub fn planes(&self) -> &[Plane] {
         &self.planes
     }
 
-    /// Its corners, relative to its centre, axes of the site, m.
+    /// The vertices relative to the centre, axes of the site frame, m.
     pub fn vertices(&self) -> &[Vector3] {
         &self.vertices
     }
 
-    /// Whether a point of the site lies inside the rock, or nearer to it than `margin_m`'s planes.
+    /// Whether a point in the site frame is inside all of the rock's planes moved outwards by `margin_m`.
     pub fn contains(&self, point: &Point3, margin_m: f64) -> bool {
         let p = point - self.centre;
         self.planes.iter().all(|plane| plane.normal.dot(&p) <= plane.offset_m + margin_m)
@@ -180,7 +180,7 @@ impl Rock {
 }
 
 impl RockLook {
-    /// Brightness 15 % (1σ); veins in three rocks of ten, pits in three others of ten (ours).
+    /// Brightness varies by 15 % (1σ); three rocks of ten have veins, three others pits (ours).
     fn draw(random: &mut Pcg64) -> Self {
         let kind: f32 = random.random();
         let strength = random.random_range(0.4..1.0f32);
@@ -193,7 +193,7 @@ impl RockLook {
     }
 }
 
-/// A shape tilted, turned and stretched so that its outline covers a disc of the diameter; z is centred by its planes.
+/// A shape tilted, rotated and stretched so that its outline has the area of the disc; z is centred by its planes.
 fn scattered_body(from: &RockSeed, axes: &Vector3, full_m: f64, random: &mut Pcg64) -> Polyhedron {
     let body = Polyhedron::grow(from.shape, axes, from.diameter_m, random);
     let tilt_rad = if from.shape == RockShape::Slab { 0.12 } else { 0.26 };
@@ -208,7 +208,7 @@ fn scattered_body(from: &RockSeed, axes: &Vector3, full_m: f64, random: &mut Pcg
     body.stretched(&Vector3::new(level, level, full_m / (bottom - top)))
 }
 
-/// A shape whose +x side looks along the yaw and whose width across it is the diameter.
+/// A shape whose +x side points along the yaw and whose width across it is the diameter.
 fn placed_body(from: &RockSeed, axes: &Vector3, full_m: f64, yaw_rad: f64, random: &mut Pcg64) -> Polyhedron {
     let across = Vector3::new(0.7, 1.0, axes.z);
     let body = match from.shape {
@@ -313,7 +313,7 @@ mod tests {
         let (&plane, &most) = faces.iter().max_by_key(|(_, count)| **count).unwrap();
         assert!(f64::from(most) > 0.6 * f64::from(all), "{faces:?}");
         let lean_deg = rock.normal(plane).angle(&-Vector3::x()).to_degrees();
-        // The stretch to the wanted height bends the lean of 12°.
+        // The stretch to the required height changes the lean of 12°.
         assert!(lean_deg < 20.0, "{lean_deg}");
         let width_m = widest_m[1] - widest_m[0];
         assert!(width_m > 0.44 && width_m < 0.501, "{width_m}");

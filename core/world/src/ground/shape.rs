@@ -54,18 +54,18 @@ impl Polyhedron {
         Self::of(planes)
     }
 
-    /// A block for a placed rock: its side towards +x is flat, leans back by 12° and keeps its edges.
+    /// A block for a placed rock: its +x side is flat, leans back by 12° and keeps its edges.
     pub(super) fn with_face(axes: &Vector3, random: &mut Pcg64) -> Self {
         let (lean_sin, lean_cos) = 12f64.to_radians().sin_cos();
         let face = Vector3::new(lean_cos, 0.0, -lean_sin);
         let mut planes = around_box(axes, 0.08, 1.0, random);
-        // The side itself, and what its neighbours would cut from its edges.
+        // Remove the side itself and the chamfers that would cut its edges.
         planes.retain(|plane| plane.normal.x < 0.3);
         planes.push(Plane { normal: face, offset_m: 0.9 * axes.x * lean_cos });
         Self::of(planes)
     }
 
-    /// The body of these half-spaces, without those that touch no vertex.
+    /// The body bounded by these half-spaces, without those that touch no vertex.
     pub(super) fn of(planes: Vec<Plane>) -> Self {
         let (mut used, mut vertices) = (vec![false; planes.len()], Vec::new());
         for (i, a) in planes.iter().enumerate() {
@@ -91,14 +91,14 @@ impl Polyhedron {
         Self { planes, vertices }
     }
 
-    /// The body turned.
+    /// The rotated body.
     pub(super) fn turned(mut self, turn: &Rotation3<f64>) -> Self {
         self.planes.iter_mut().for_each(|plane| plane.normal = turn * plane.normal);
         self.vertices.iter_mut().for_each(|vertex| *vertex = turn * *vertex);
         self
     }
 
-    /// The body stretched along the axes.
+    /// The body stretched along the axes by the factors `by`.
     pub(super) fn stretched(mut self, by: &Vector3) -> Self {
         for plane in &mut self.planes {
             let normal = plane.normal.component_div(by);
@@ -109,7 +109,7 @@ impl Polyhedron {
         self
     }
 
-    /// From where to where the body reaches along an axis.
+    /// Lower and upper limit of the body along an axis.
     pub(super) fn extent(&self, axis: usize) -> [f64; 2] {
         self.vertices.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], vertex| {
             [low.min(vertex[axis]), high.max(vertex[axis])]
@@ -146,8 +146,8 @@ fn angular_count(diameter_m: f64) -> usize {
     if diameter_m < 0.06 { 10 } else { 14 + (40.0 * diameter_m).min(14.0) as usize }
 }
 
-/// Planes tangent to an ellipsoid, their normals jittered and pushed in by up to the given parts, and the six of a
-/// box around it that bound it for certain.
+/// Planes tangent to an ellipsoid, with jittered normals and pushed in by up to the given fractions, and the six planes of
+/// a box around it that guarantee a bounded body.
 fn around_ellipsoid(
     axes: &Vector3,
     count: usize,
@@ -160,7 +160,7 @@ fn around_ellipsoid(
     let spin = Rotation3::from_euler_angles(angle_rad(), angle_rad(), angle_rad());
     let mut planes = Vec::with_capacity(count + 6);
     for k in 0..count {
-        // Points on a spiral are nearly even over the sphere; the jitter breaks the pattern.
+        // Points on a spiral are nearly uniform over the sphere; the jitter breaks the pattern.
         let z = 1.0 - (2.0 * k as f64 + 1.0) / count as f64;
         let (r, angle) = ((1.0 - z * z).sqrt(), golden_rad * k as f64);
         let direction = Vector3::new(r * angle.cos(), r * angle.sin(), z);

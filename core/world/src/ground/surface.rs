@@ -1,18 +1,17 @@
-//! What the surfaces look like: albedo and shading normal of soil and rock.
+//! Appearance of the surfaces: albedo and shading normal of soil and rock.
 //!
-//! Soil: two-dimensional octaves over the site's plane; its normal is the smooth slope of the height field
-//! plus the micro-slope. Rock: three-dimensional octaves about the rock's centre, on the face's normal;
-//! each rock has its own brightness, and dust lies in patches on what faces up. Grains, drifts, veins and pits
-//! come on top (`details.rs`). The micro-relief tilts normals only: the surface that rays meet is that of
-//! `terrain.rs` and `rocks.rs`.
+//! Soil: two-dimensional octaves over the site's plane; its normal is the smooth slope of the height field plus the
+//! micro-slope. Rock: three-dimensional octaves about the rock's centre, on the face's normal; each rock has its own
+//! brightness, and upward faces have patches of dust. Grains, drifts, veins and pits are added (`details.rs`). The
+//! micro-relief tilts normals only: the surface that rays meet is that of `terrain.rs` and `rocks.rs`.
 //!
 //! **Spectrum.** The albedo's power per unit area of the frequency plane falls as f^−β (`spectrum_slope`): octaves with
-//! amplitude ∝ λ^h hold their variance λ^{2h} in a band of area ∝ λ^{−2}, so h = (β − 2)/2.
+//! amplitude ∝ λ^h have the variance λ^{2h} in a band of area ∝ λ^{−2}, so h = (β − 2)/2.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
 //! | β | `spectrum_slope` | – |
-//! | c | `cutoff_m` | m: wavelengths below it are left out, below twice it are weakened (`texture.rs`) |
+//! | c | `cutoff_m` | m: shorter wavelengths are left out, those up to twice it weakened (`texture.rs`) |
 //!
 //! Frames: site. Sources: domain.md 10.4.
 
@@ -37,7 +36,7 @@ pub(crate) struct Face<'a> {
     pub normal: Vector3,
 }
 
-/// The look of soil and rock.
+/// The appearance of soil and rock.
 #[derive(Clone, Debug)]
 pub(crate) struct Surfaces {
     soil: Octaves<2>,
@@ -57,7 +56,7 @@ fn unit(v: [f32; 3]) -> [f32; 3] {
 }
 
 impl Surfaces {
-    /// The look of the scenario's surfaces.
+    /// Builds the appearance from the scenario's texture settings.
     pub(crate) fn new(settings: &TextureSettings, seed: u64) -> Self {
         let octaves = |longest_m: f64, slope_std: f64| OctaveSettings {
             longest_m,
@@ -67,7 +66,7 @@ impl Surfaces {
             albedo_std: settings.albedo_std,
             slope_std,
         };
-        // A rock is no larger than half a metre: longer waves would only change its brightness.
+        // A rock is at most about half a metre wide: longer waves would only change its mean brightness.
         let rock_longest_m = settings.longest_m.min(0.2).max(settings.shortest_m);
         let (grains, drifts) = (settings.grain_cover, settings.drift_cover);
         Self {
@@ -82,7 +81,7 @@ impl Surfaces {
         }
     }
 
-    /// The soil at the first `count` of many places of the ground, (x, y) by lane, m, site frame.
+    /// The soil at the first `count` of many points of the ground, (x, y) by lane, m, site frame.
     #[inline(always)]
     pub(crate) fn soil(
         &self,
@@ -111,7 +110,7 @@ impl Surfaces {
         looks
     }
 
-    /// One rock at points of its faces; lanes without one come last.
+    /// One rock at points of its faces; lanes without a point come last.
     #[inline(always)]
     pub(crate) fn rock(
         &self,
@@ -158,14 +157,14 @@ impl Surfaces {
         looks
     }
 
-    /// A rock with this texture on one of its faces.
+    /// Appearance of a rock with this texture on one of its faces.
     fn on_face(&self, face: &Face<'_>, texture: &TextureSample<3>) -> Appearance {
         let n = [face.normal.x as f32, face.normal.y as f32, face.normal.z as f32];
-        // A relief of height b over the face tilts its normal by the part of ∇b that lies in the face.
+        // A relief of height b over the face tilts its normal by the component of ∇b in the face.
         let out = n[0] * texture.slope[0] + n[1] * texture.slope[1] + n[2] * texture.slope[2];
         let normal = unit(std::array::from_fn(|k| n[k] - (texture.slope[k] - out * n[k])));
         let up = (-n[2]).max(0.0);
-        // Dust lies in the hollows of the noise and leaves its crests bare.
+        // Dust fills the hollows of the noise and leaves its crests bare.
         let dust = (self.dust * up * up * (1.0 + 3.0 * texture.albedo)).clamp(0.0, 1.0);
         let bare = self.rock_albedo * face.rock.look.brightness;
         let albedo = bare + dust * (self.soil_albedo - bare);

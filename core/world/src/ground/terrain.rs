@@ -1,14 +1,13 @@
 //! The ground: a fractal height field of bilinear patches on a regular grid, and a plane beyond it.
 //!
-//! **Relief.** Heights at the grid's vertices come from `relief.rs`. They fade to the mean plane over the outer
-//! 1.5 m of the grid, so that the plane beyond continues the surface without a step. A vertex is stored as
-//! `f32`; that number *is* the surface, all geometry on it is done in `f64`.
+//! **Relief.** Heights at the grid's vertices follow `relief.rs`. They fade to the mean plane over the outer 1.5 m of the
+//! grid, so that the plane beyond continues the surface without a step. A vertex is stored as `f32`; that number *is* the
+//! surface, and all geometry on it is done in `f64`.
 //!
-//! **Tilt.** The mean plane may rise: `z = z_level(x, y) + a x + b y`, (a, b) = −tan(slope) (cos, sin)(azimuth of
-//! steepest ascent). The grid holds z_level, and the sum is exact in `f64`; the ground is a shear of level ground, and
-//! so is its intersection with a ray (`terrain_cast.rs`). Heights are measured along z, not along the plane's normal:
-//! at 20° the relief's amplitude across the slope is 6 % smaller. Far from the site a slope turns back to the level
-//! (`far.rs`).
+//! **Tilt.** The mean plane may rise: `z = z_level(x, y) + a x + b y`, (a, b) = −tan(slope) (cos, sin)(azimuth of steepest
+//! ascent). The grid stores z_level, and the sum is exact in `f64`; the ground is a shear of level ground, and so is its
+//! intersection with a ray (`terrain_cast.rs`). Heights are measured along z, not along the plane's normal: at 20° the
+//! relief's amplitude across the slope is 6 % smaller. Far from the site a slope returns to the mean level (`far.rs`).
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
@@ -25,13 +24,13 @@ use crate::ground::level::MEAN_GROUND_Z_M;
 use crate::ground::relief::Relief;
 use crate::scenario::TerrainSettings;
 
-/// Over which width the relief fades to the plane at the edges of the grid, m.
+/// Width over which the relief fades to the plane at the edges of the grid, m.
 const FADE_M: f64 = 1.5;
 
-/// Blocks have 2^shift cells along a side: 64, 16, 4 and 1, from the coarsest walk to the finest.
+/// Blocks have 2^shift cells along a side: 64, 16, 4 and 1, from the coarsest level to the finest.
 pub(crate) const BLOCK_SHIFT: [usize; 4] = [6, 4, 2, 0];
 
-/// Height of the highest point (least z) of every block of one size.
+/// Highest point (smallest z) of every block of one size.
 #[derive(Clone, Debug)]
 pub(crate) struct Tops {
     pub(crate) columns: usize,
@@ -45,18 +44,18 @@ pub(crate) struct Terrain {
     pub(crate) cell_m: f64,
     /// Cells along x and y.
     pub(crate) cells: [usize; 2],
-    /// Heights of the (cells + 1)² vertices, rows along x.
+    /// z of the (cells + 1)² vertices without the tilt, m, rows along x.
     z_m: Vec<f32>,
     /// Gradient of the height at the vertices, for smooth shading.
     slope: Vec<[f32; 2]>,
     pub(crate) tops: Vec<Tops>,
-    /// The same for a block with its eight neighbours.
+    /// The same for each block with its eight neighbours.
     pub(crate) wide_tops: Vec<Tops>,
     pub(crate) highest_z_m: f64,
     steepest: f64,
-    /// Gradient of the mean plane, m/m; heights above are those of the ground without it.
+    /// Gradient of the mean plane, m/m; the stored heights exclude it.
     pub(crate) tilt: [f64; 2],
-    /// What lies beyond a slope; nothing where the ground is level.
+    /// The ground beyond a slope; `None` for level ground.
     pub(crate) far: Option<Far>,
 }
 
@@ -67,8 +66,7 @@ impl Terrain {
         Self::new_until(settings, x_m, y_m, seed, Cancel::default()).unwrap()
     }
 
-    /// A fractal ground over the rectangle `x_m` × `y_m` (from, to) of the site frame; fails soon after `cancel` is
-    /// requested.
+    /// A fractal ground over the rectangle `x_m` × `y_m` (from, to) of the site frame; cancellable.
     pub(crate) fn new_until(
         settings: &TerrainSettings,
         x_m: [f64; 2],
@@ -94,14 +92,14 @@ impl Terrain {
         // Level ground must not get a sum of −0 and 0 that differs between directions.
         let tilt = if tangent == 0.0 { [0.0; 2] } else { [-tangent * cos, -tangent * sin] };
         let mut terrain = Self::from_heights([x_m[0], y_m[0]], cell_m, cells, z_m, tilt);
-        // The grid lies on the slope whatever the setting.
+        // The grid is always inside the slope, whatever the setting.
         let corner_m = x_m[0].abs().max(x_m[1].abs()).hypot(y_m[0].abs().max(y_m[1].abs()));
         let radius_m = settings.slope_reach_m.max(corner_m + 1.0);
         terrain.far = (tangent != 0.0).then(|| Far::new(radius_m, tilt));
         Ok(terrain)
     }
 
-    /// A ground of given vertex heights, m down; `z_m` holds (cells + 1) vertices along each axis.
+    /// A ground of given vertex heights, m, positive down; `z_m` contains (cells + 1) vertices along each axis.
     fn from_heights(
         origin_m: [f64; 2],
         cell_m: f64,
@@ -117,14 +115,14 @@ impl Terrain {
         Self { origin_m, cell_m, cells, z_m, slope, tops, wide_tops, highest_z_m, steepest, tilt, far: None }
     }
 
-    /// No part of the ground is steeper than this, m/m.
+    /// Upper bound of the ground's slope, m/m.
     ///
     /// A ray that rises more steeply never meets the ground again after leaving it.
     pub(crate) fn steepest(&self) -> f64 {
         self.steepest
     }
 
-    /// Height of the mean plane over that of level ground at a place, m down.
+    /// z of the mean plane relative to level ground at a point, m, positive down.
     #[inline(always)]
     pub(crate) fn tilt_m(&self, x_m: f64, y_m: f64) -> f64 {
         self.tilt[0] * x_m + self.tilt[1] * y_m
@@ -135,7 +133,7 @@ impl Terrain {
         Vector3::new(self.tilt[0], self.tilt[1], -1.0).normalize()
     }
 
-    /// The unit normal of the mean ground at a place, pointing up (negative z), site frame.
+    /// The unit normal of the mean ground at a point, pointing up (negative z), site frame.
     pub(crate) fn mean_normal_at(&self, x_m: f64, y_m: f64) -> Vector3 {
         match self.far.and_then(|far| far.gradient_at(x_m, y_m)) {
             Some([zx, zy]) => Vector3::new(zx, zy, -1.0).normalize(),
@@ -143,7 +141,7 @@ impl Terrain {
         }
     }
 
-    /// The cell of a place and the position within it, or nothing beyond the grid.
+    /// The cell of a point and the position within it; `None` beyond the grid.
     fn locate(&self, x_m: f64, y_m: f64) -> Option<([usize; 2], f64, f64)> {
         let p = [(x_m - self.origin_m[0]) / self.cell_m, (y_m - self.origin_m[1]) / self.cell_m];
         if !(0..2).all(|k| p[k] >= 0.0 && p[k] < self.cells[k] as f64) {
@@ -161,7 +159,7 @@ impl Terrain {
         [self.z_m[at], self.z_m[at + 1], self.z_m[below], self.z_m[below + 1]].map(f64::from)
     }
 
-    /// Height of the ground at a place, m down.
+    /// z of the ground at a point, m, positive down.
     pub(crate) fn z_at(&self, x_m: f64, y_m: f64) -> f64 {
         let tilt_m = self.tilt_m(x_m, y_m);
         let Some((cell, u, v)) = self.locate(x_m, y_m) else {
@@ -171,7 +169,7 @@ impl Terrain {
         z00 + (z10 - z00) * u + (z01 - z00) * v + (z00 - z10 - z01 + z11) * u * v + tilt_m
     }
 
-    /// The unit normal of the surface itself at a place, pointing up (negative z).
+    /// The unit normal of the true surface at a point, pointing up (negative z).
     pub(crate) fn normal_at(&self, x_m: f64, y_m: f64) -> Vector3 {
         let Some((cell, u, v)) = self.locate(x_m, y_m) else { return self.mean_normal_at(x_m, y_m) };
         let [z00, z10, z01, z11] = self.corners(cell);
@@ -180,7 +178,7 @@ impl Terrain {
         Vector3::new(zx + self.tilt[0], zy + self.tilt[1], -1.0).normalize()
     }
 
-    /// The gradient (∂z/∂x, ∂z/∂y) used for shading: that of the vertices, joined smoothly.
+    /// The gradient (∂z/∂x, ∂z/∂y) for shading, interpolated smoothly between the vertices.
     ///
     /// The true gradient jumps from cell to cell; shading with it would show the grid.
     #[inline(always)]
@@ -292,7 +290,7 @@ mod tests {
             assert!((b.x / -b.z - (a.x / -a.z - rise * cos)).abs() < 1e-12);
             assert!((b.y / -b.z - (a.y / -a.z - rise * sin)).abs() < 1e-12);
         }
-        // On the right (y > 0) the ground of this azimuth is higher: less z.
+        // On the right (y > 0) the ground is higher for this azimuth: smaller z.
         assert!(tilted.z_at(0.0, 3.0) < tilted.z_at(0.0, -3.0));
         assert!((tilted.mean_normal().angle(&-Vector3::z()).to_degrees() - 18.0).abs() < 1e-9);
     }

@@ -1,18 +1,18 @@
 //! The exact intersection of a ray with the ground.
 //!
-//! Within a cell, z(u, v) = z00 + a u + b v + c u v and a ray is linear in t, so that
-//! `F(t) = z_ray(t) − z(u(t), v(t))` is a quadratic with the exact root as the hit. F > 0 is below ground
-//! (z points down). Cells are found by a nested walk over blocks (`block_walk.rs`). A ray that enters a cell already below the ground
-//! is taken as hit where it enters, which closes the rounding gap between neighbouring cells.
+//! Within a cell, z(u, v) = z00 + a u + b v + c u v and a ray is linear in t, so that `F(t) = z_ray(t) − z(u(t), v(t))` is
+//! a quadratic whose root is the exact hit. F > 0 is below ground (z points down). Cells are found by traversing nested
+//! blocks (`block_walk.rs`). A ray that enters a cell already below the ground hits at its entry, which closes the
+//! rounding gap between neighbouring cells.
 //!
-//! Tilted ground is level ground sheared along z, `z = z_level + a x + b y`. The ray is sheared back, which leaves it
-//! a straight line with the same t, so that everything below happens over level ground. What lies beyond the slope is
-//! met in its own way (`far.rs`).
+//! Tilted ground is level ground sheared along z, `z = z_level + a x + b y`. The ray is sheared back and remains a
+//! straight line with the same t, so that everything below uses level ground. The ground beyond the slope has its own
+//! intersection (`far.rs`).
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
 //! | t | distance along the ray, `_m` | m |
-//! | s | distance along the ray from where it enters a cell | m |
+//! | s | distance along the ray from its entry into a cell | m |
 //! | u, v | position within a cell, 0 to 1 along x and y | – |
 //! | z | height, `z_m` | m, site frame, down |
 //!
@@ -25,11 +25,11 @@ use crate::ground::block_walk::{Blocks, CellRay};
 use crate::ground::level::MEAN_GROUND_Z_M;
 use crate::ground::terrain::{BLOCK_SHIFT, Terrain};
 
-/// The level of blocks at which a walk starts where the ground is near: 4 × 4 cells.
+/// The level of blocks at which a traversal starts near the ground: 4 × 4 cells.
 const NEAR_LEVEL: usize = 2;
 
 impl Terrain {
-    /// Distance along `ray` to the ground within [`from_m`, `to_m`], m, or nothing.
+    /// Distance along `ray` to the ground within [`from_m`, `to_m`], m; `None` without a hit.
     ///
     /// A ray that is below ground at `from_m` hits there.
     #[inline(always)]
@@ -49,8 +49,8 @@ impl Terrain {
 
     /// A distance before which no ray of a narrow cone meets the grid, m.
     ///
-    /// The cone's axis is walked over the highest points of blocks with their neighbours, lowered by the cone's radius, as
-    /// long as the cone is narrower than a block.
+    /// The cone's axis traverses the highest points of blocks with their neighbours, lowered by the cone's radius, as long
+    /// as the cone is narrower than a block.
     pub(crate) fn clear_m(&self, cone: &Cone) -> f64 {
         let [radius_m, growth] = cone.spread();
         let lower = 1.0 + self.tilt[0].hypot(self.tilt[1]);
@@ -85,7 +85,7 @@ impl Terrain {
         blocks.walk(0, &ray, start_m, leave_m).unwrap_or(leave_m)
     }
 
-    /// A ray over the ground without its tilt; its direction need not be unit.
+    /// A ray over the ground without its tilt; its direction need not be a unit vector.
     #[inline(always)]
     fn level(&self, ray: &Ray) -> Ray {
         let mut ray = *ray;
@@ -94,16 +94,16 @@ impl Terrain {
         ray
     }
 
-    /// The same where the mean ground is a plane.
+    /// [`Terrain::cast_beyond`] where the mean ground is a plane.
     #[inline(always)]
     fn cast_slope(&self, ray: &Ray, clear_m: f64, from_m: f64, to_m: f64) -> Option<f64> {
         self.cast_level(&self.level(ray), clear_m, from_m, to_m)
     }
 
-    /// The same over the ground without its tilt; the ray's direction need not be unit.
+    /// The same over the ground without its tilt; the ray's direction need not be a unit vector.
     #[inline(always)]
     fn cast_level(&self, ray: &Ray, clear_m: f64, from_m: f64, to_m: f64) -> Option<f64> {
-        // Nothing can be hit where the ray is above the highest point; most of a camera's ray is.
+        // No hit is possible above the highest point, where most of a camera's ray is.
         let (mut from_m, mut to_m) = (from_m, to_m);
         let above_m = self.highest_z_m - ray.origin.z;
         let dz = ray.direction.z;
@@ -179,7 +179,7 @@ impl Terrain {
         let (a, b, c) = (z10 - z00, z01 - z00, z00 - z10 - z01 + z11);
         let u = ray.p[0] + ray.d[0] * enter_m - cell[0] as f64;
         let v = ray.p[1] + ray.d[1] * enter_m - cell[1] as f64;
-        // F(s) = q0 + q1 s + q2 s², s measured from where the ray enters.
+        // F(s) = q0 + q1 s + q2 s², s measured from the point of entry.
         let q0 = ray.z_m + ray.dz * enter_m - (z00 + a * u + b * v + c * u * v);
         if q0 >= 0.0 {
             return Some(enter_m);
@@ -191,7 +191,7 @@ impl Terrain {
     }
 }
 
-/// The least positive root of q0 + q1 s + q2 s², given q0 < 0.
+/// The smallest positive root of q0 + q1 s + q2 s², given q0 < 0.
 #[inline(always)]
 fn first_root(q0: f64, q1: f64, q2: f64) -> Option<f64> {
     if q2 == 0.0 {
@@ -249,7 +249,7 @@ mod tests {
                 let ray = Ray { origin, direction };
                 match (terrain.cast(&ray, 0.0, 20.0), march(&terrain, &ray, 20.0)) {
                     (Some(cast), Some(marched)) if (cast - marched).abs() < 1e-9 => {}
-                    // The march can step over a crest that the ray just touches; cast must then be nearer.
+                    // The march can step over a crest that the ray just touches; `cast` must then be nearer.
                     (Some(cast), marched) if marched.is_none_or(|m| cast < m) => {
                         grazing_misses += 1;
                         let p = ray.at(cast);

@@ -1,13 +1,12 @@
 //! Seeded noise: the fine texture of soil and rock, and the coarse relief of the ground.
 //!
-//! Sums of octaves of value noise (`value_noise.rs`). Its first channel makes the albedo, its second a height whose
-//! *gradient* tilts the shading normal: both come from one look-up. The sums follow a power law; every octave is
-//! turned and shifted by its own amount so that no lattice shows.
+//! Sums of octaves of value noise (`value_noise.rs`). Its first channel gives the albedo, its second a height whose
+//! *gradient* tilts the shading normal: both come from one look-up. The sums follow a power law; every octave is rotated
+//! and shifted differently so that no lattice shows.
 //!
-//! Octaves shorter than what a picture can resolve are faded out (`cutoff_m`), the rest is left to the
-//! sampling of the pixel area (`render.rs`): `weight(λ) = smoothstep((λ − c)/c)`, 0 below c and 1 above 2c.
-//! Lattice coordinates are formed in `f64` (1.5 mm cells tens of metres from the origin), those of many points at once partly
-//! in `f32` (`value_noise.rs`).
+//! Octaves shorter than an image can resolve are faded out (`cutoff_m`), the rest is left to the sampling of the pixel
+//! area (`render.rs`): `weight(λ) = smoothstep((λ − c)/c)`, 0 below c and 1 above 2c. Lattice coordinates are formed in
+//! `f64` (1.5 mm cells tens of metres from the origin), those of many points at once partly in `f32` (`value_noise.rs`).
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -26,16 +25,16 @@ use std::f64::consts::TAU;
 
 use crate::ground::value_noise::{Lattice, LatticeMap, Points, ValueNoise};
 
-/// How many points are looked at together: a pixel's samples, and the numbers of the widest vector.
+/// Number of points evaluated together: the samples of a pixel, and the lanes of the widest vector.
 pub const LANES: usize = 16;
 
-/// Mean of w² + (1 − w)² over a cell: what joining two lattice numbers keeps of their variance, 1/3.
+/// Mean of w² + (1 − w)² over a cell: the fraction of the lattice numbers' variance (1/3) that interpolation keeps.
 const JOINED_VARIANCE: f64 = 2.0 * 181.0 / 462.0;
-/// Standard deviation of one component of an octave's gradient over that of its value: sqrt(2 ∫w'² / I),
-/// with ∫w'² = 10/7 and I the variance kept.
+/// Standard deviation of one component of an octave's gradient over that of its value: sqrt(2 ∫w'² / I), with ∫w'² = 10/7
+/// and I the fraction kept.
 const SLOPE_OVER_VALUE: f64 = 1.9096;
 
-/// What a sum of octaves gives at one point.
+/// Value of a sum of octaves at one point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextureSample<const DIMENSIONS: usize> {
     /// Relative deviation of the albedo from its mean, without unit.
@@ -44,7 +43,7 @@ pub struct TextureSample<const DIMENSIONS: usize> {
     pub slope: [f32; DIMENSIONS],
 }
 
-/// What a sum of octaves gives at [`LANES`] points, by component and lane.
+/// Values of a sum of octaves at [`LANES`] points, by component and lane.
 #[derive(Clone, Copy, Debug)]
 pub struct TextureLanes<const DIMENSIONS: usize> {
     /// As in [`TextureSample`].
@@ -53,16 +52,16 @@ pub struct TextureLanes<const DIMENSIONS: usize> {
     pub slope: [[f32; LANES]; DIMENSIONS],
 }
 
-/// How a sum of octaves is made.
+/// Parameters of a sum of octaves.
 #[derive(Clone, Copy, Debug)]
 pub struct OctaveSettings {
     /// The longest wavelength, m.
     pub longest_m: f64,
-    /// No octave is shorter than this, m.
+    /// Lower limit of the wavelengths, m.
     pub shortest_m: f64,
     /// Ratio of neighbouring wavelengths, > 1.
     pub ratio: f64,
-    /// Exponent of the albedo's amplitude over wavelength: `a ∝ λ^h`.
+    /// Exponent h of the albedo's amplitude over wavelength: `a ∝ λ^h`.
     pub albedo_exponent: f64,
     /// Standard deviation of the albedo, relative, all octaves together.
     pub albedo_std: f64,
@@ -75,7 +74,7 @@ pub struct OctaveSettings {
 struct Octave<const DIMENSIONS: usize> {
     wavelength_m: f32,
     lattice_from_site: LatticeMap<DIMENSIONS>,
-    /// The same turn without the scale, for taking gradients back.
+    /// The same rotation without the scale, to transform gradients back.
     turn: [[f32; DIMENSIONS]; DIMENSIONS],
     seed: u32,
     albedo: f32,
@@ -96,12 +95,12 @@ pub const fn mix(value: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// A number in [0, 1) from a seed and an index, for settings that need no stream of randomness.
+/// A number in [0, 1) from a seed and an index, for parameters that need no random stream.
 fn unit_interval(seed: u64, index: u64) -> f64 {
     (mix(mix(seed) ^ index) >> 11) as f64 / (1u64 << 53) as f64
 }
 
-/// The least number of all lanes, halving the lanes, which a vector does at once.
+/// The smallest of all lanes, found by halving, which vectorises.
 #[inline(always)]
 pub(crate) fn least<T: Copy + PartialOrd>(lanes: &[T; LANES]) -> T {
     let mut least = *lanes;
@@ -115,7 +114,7 @@ pub(crate) fn least<T: Copy + PartialOrd>(lanes: &[T; LANES]) -> T {
     least[0]
 }
 
-/// How much of an octave is left above the cutoff: 0 below it, 1 from twice the cutoff.
+/// Weight of an octave: 0 below the cutoff, 1 from twice the cutoff.
 #[inline(always)]
 pub(super) fn weight(wavelength_m: f32, cutoff_m: f32) -> f32 {
     let t = ((wavelength_m - cutoff_m) / cutoff_m).clamp(0.0, 1.0);
@@ -123,7 +122,7 @@ pub(super) fn weight(wavelength_m: f32, cutoff_m: f32) -> f32 {
 }
 
 impl<const DIMENSIONS: usize> Octaves<DIMENSIONS> {
-    /// The octaves of `settings`, seeded; amplitudes are scaled to the stated standard deviations.
+    /// The octaves of `settings`, seeded; amplitudes are scaled to the given standard deviations.
     pub fn new(settings: &OctaveSettings, seed: u64) -> Self {
         let std_of_one = octave_std(DIMENSIONS);
         let wavelengths_m: Vec<f64> =
@@ -170,7 +169,7 @@ impl<const DIMENSIONS: usize> Octave<DIMENSIONS>
 where
     Lattice<DIMENSIONS>: ValueNoise<DIMENSIONS>,
 {
-    /// The octave's share of the sum from its noise, under a weight.
+    /// The octave's weighted contribution to the sum, from its noise.
     #[inline(always)]
     fn weighted(
         &self,
@@ -192,7 +191,8 @@ impl<const DIMENSIONS: usize> Octaves<DIMENSIONS>
 where
     Lattice<DIMENSIONS>: ValueNoise<DIMENSIONS>,
 {
-    /// The sum at a point, m, without octaves shorter than `cutoff_m`: (x, y) of the site, or from the rock's centre.
+    /// The sum at a point, m, without octaves shorter than `cutoff_m`: (x, y) of the site, or relative to the rock's
+    /// centre.
     #[inline(always)]
     pub fn at(&self, p_m: [f64; DIMENSIONS], cutoff_m: f32) -> TextureSample<DIMENSIONS> {
         let mut sum = TextureSample { albedo: 0.0, slope: [0.0; DIMENSIONS] };
@@ -210,10 +210,10 @@ where
         sum
     }
 
-    /// The sums at many points, each with its own cutoff: [`Octaves::at`] but for the rounding of `f32` offsets, many times as
-    /// fast where the points lie close together. Lanes without a point repeat the first.
+    /// The sums at many points, each with its own cutoff. Equals [`Octaves::at`] up to the rounding of `f32` offsets and
+    /// is many times as fast where the points are close together. Lanes without a point repeat the first.
     ///
-    /// Plain loops over lanes, of which the compiler makes vectors as wide as the caller may use.
+    /// Plain loops over lanes, which the compiler vectorises as widely as the caller's target features allow.
     #[inline(always)]
     pub(crate) fn at_lanes(
         &self,
@@ -323,7 +323,7 @@ mod tests {
         for k in 0..200 {
             let axis = |by: f64| -> [f64; LANES] { std::array::from_fn(|n| by * (16 * k + n) as f64 - 7.0) };
             let (x, y, z) = (axis(0.003_71), axis(0.0131), axis(-0.0007));
-            // Some lanes see all octaves, some none.
+            // Some lanes include all octaves, some none.
             let cutoff_m: [f32; LANES] = std::array::from_fn(|n| 1e-4 * 1.9f32.powi(n as i32));
             let (soil, rock) = (
                 plane.at_lanes(&Points::new(&[x, y]), &cutoff_m),

@@ -1,13 +1,13 @@
-//! Value noise over a lattice: hashes of full coordinates, joined smoothly.
+//! Value noise over a lattice: hashes of full coordinates, interpolated smoothly.
 //!
-//! A hash gives every lattice point two independent numbers in [−1, 1] (16 bits each), which are joined by the
-//! quintic `w(t) = t³(6t² − 15t + 10)`, so that value and slope are continuous. Of the first the *value* is given, of
-//! the second the *gradient*. Nothing repeats, because the hash takes full 32-bit lattice coordinates.
+//! A hash gives every lattice point two independent numbers in [−1, 1] (16 bits each), which are interpolated by the
+//! quintic `w(t) = t³(6t² − 15t + 10)`, so that value and slope are continuous. The noise returns the *value* of the first
+//! and the *gradient* of the second. Nothing repeats, because the hash takes full 32-bit lattice coordinates.
 //!
-//! All of it is free of branches and of tables, so that loops over many points become loops over vectors
-//! (`texture.rs`, `Octaves::at_lanes`). Lattice coordinates are `f64`, positions within a cell `f32`. Points of one pixel lie
-//! close together: the corner of a coarse square is located in `f64` and they by `f32` offsets from it ([`Points`]), and where
-//! all lie in one cell its corners are hashed once ([`Cells`]).
+//! All of it is free of branches and tables, so that loops over many points vectorise (`texture.rs`, `Octaves::at_lanes`).
+//! Lattice coordinates are `f64`, positions within a cell `f32`. Points of one pixel are close together: the corner of a
+//! coarse square is located in `f64` and the points by `f32` offsets from it ([`Points`]); if all are in one cell, its
+//! corners are hashed once ([`Cells`]).
 //!
 //! Source: domain.md 10.4.
 
@@ -23,16 +23,16 @@ pub struct Lattice<const DIMENSIONS: usize>;
 
 /// Value noise of one lattice.
 pub trait ValueNoise<const DIMENSIONS: usize> {
-    /// The two numbers of each corner of a cell, x running fastest.
+    /// The two numbers of each corner of a cell, x fastest.
     type Corners: Copy;
 
     /// The corners of a cell.
     fn corners(cell: [u32; DIMENSIONS], seed: u32) -> Self::Corners;
 
-    /// At a position within a cell, 0 to 1: value of the first channel, gradient of the second.
+    /// Interpolates at a position within a cell, 0 to 1: value of the first channel, gradient of the second.
     fn join(corners: &Self::Corners, part: [f32; DIMENSIONS]) -> (f32, [f32; DIMENSIONS]);
 
-    /// At a point in units of the lattice: value of the first channel, gradient of the second.
+    /// Noise at a point in lattice units: value of the first channel, gradient of the second.
     #[inline(always)]
     fn noise(lattice: [f64; DIMENSIONS], seed: u32) -> (f32, [f32; DIMENSIONS]) {
         let split = lattice.map(split);
@@ -42,13 +42,13 @@ pub trait ValueNoise<const DIMENSIONS: usize> {
 
 /// Points, each as a corner of a coarse square of [`SQUARE_M`] and an offset from it.
 ///
-/// The offset has the digits of the millimetres in `f32`, and where all points lie in one square, as those of a pixel do,
-/// only its corner is located in `f64`. The corner of a point does not depend on the others, nor does its noise.
+/// An `f32` offset is precise enough for millimetres, and if all points are in one square, like those of a pixel, only its
+/// corner is located in `f64`. The corner and the noise of a point do not depend on the other points.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Points<const DIMENSIONS: usize> {
     corners_m: [[f64; LANES]; DIMENSIONS],
     offsets_m: [[f32; LANES]; DIMENSIONS],
-    /// Whether all points lie in one square.
+    /// Whether all points are in one square.
     is_one: bool,
 }
 
@@ -75,7 +75,7 @@ impl<const DIMENSIONS: usize> Points<DIMENSIONS> {
     }
 }
 
-/// The linear map of points, m, to coordinates of a lattice.
+/// The affine map from points, m, to lattice coordinates.
 #[derive(Clone, Debug)]
 pub(crate) struct LatticeMap<const DIMENSIONS: usize> {
     matrix: [[f64; DIMENSIONS]; DIMENSIONS],
@@ -102,7 +102,7 @@ impl<const DIMENSIONS: usize> LatticeMap<DIMENSIONS> {
         lattice
     }
 
-    /// The cells of points.
+    /// The lattice cells of points.
     #[inline(always)]
     pub(crate) fn cells(&self, points: &Points<DIMENSIONS>) -> Cells<DIMENSIONS> {
         let (mut cells, mut parts) = ([[0; LANES]; DIMENSIONS], [[0.0; LANES]; DIMENSIONS]);
@@ -146,20 +146,20 @@ impl<const DIMENSIONS: usize> LatticeMap<DIMENSIONS> {
     }
 }
 
-/// Cells of points and positions within them.
+/// Lattice cells of points, and positions within them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cells<const DIMENSIONS: usize> {
     /// The cells, by component and lane.
     cells: [[u32; LANES]; DIMENSIONS],
     /// Positions within the cells, 0 to 1, by component and lane.
     parts: [[f32; LANES]; DIMENSIONS],
-    /// Whether all points lie in one cell, so that its corners serve all.
+    /// Whether all points are in one cell, so that one set of corners serves all.
     pub(crate) is_one: bool,
 }
 
 impl<const DIMENSIONS: usize> Cells<DIMENSIONS> {
-    /// The cells of points on a lattice of this many cells a metre, located in `f64`: for what has edges, where a point
-    /// that moves by the last digit of [`Points`] can come to lie on the other side.
+    /// The cells of points on a lattice of `per_m` cells a metre, located in `f64`: for features with edges, where a
+    /// change in the last digit of [`Points`] could move a point across an edge.
     #[inline(always)]
     pub(crate) fn at(p_m: &[[f64; LANES]; DIMENSIONS], per_m: f64) -> Self {
         let (mut cells, mut parts) = ([[0; LANES]; DIMENSIONS], [[0.0; LANES]; DIMENSIONS]);
@@ -196,7 +196,7 @@ impl<const DIMENSIONS: usize> Cells<DIMENSIONS> {
     }
 }
 
-/// [`split`] of a number below 2^22, without branches; of a larger one some cell, and a fraction within [0, 1].
+/// [`split`] of a number below 2^22, without branches; for a larger one an arbitrary cell, and a fraction within [0, 1].
 #[inline(always)]
 fn split_near(coordinate: f32) -> (u32, f32) {
     /// 1.5 · 2^23, as in [`split`].
@@ -206,7 +206,7 @@ fn split_near(coordinate: f32) -> (u32, f32) {
     ((whole + ROUND_F32).to_bits().wrapping_sub(ROUND_F32.to_bits()), (coordinate - whole).clamp(0.0, 1.0))
 }
 
-/// Avalanche of 32 bits.
+/// Avalanche mixing of 32 bits.
 #[inline(always)]
 fn scramble(mut h: u32) -> u32 {
     h ^= h >> 16;
@@ -223,7 +223,7 @@ fn channels(h: u32) -> (f32, f32) {
     ((h & 0xffff) as f32 * SCALE - 1.0, (h >> 16) as f32 * SCALE - 1.0)
 }
 
-/// The numbers of some lattice points; a loop, because closures are not always inlined into vector code.
+/// The two numbers of several lattice points; a loop, because closures are not always inlined into vector code.
 #[inline(always)]
 fn numbers<const COUNT: usize>(hashes: [u32; COUNT]) -> [(f32, f32); COUNT] {
     let mut numbers = [(0.0, 0.0); COUNT];
@@ -242,10 +242,10 @@ fn fade(t: f32) -> (f32, f32) {
 /// 1.5 · 2^52: a number added to it is rounded to an integer, which then fills the last bits.
 const ROUND: f64 = 6_755_399_441_055_744.0;
 
-/// Splits a lattice coordinate into its integer, of which the last 32 bits count, and its fraction in [0, 1).
+/// Splits a lattice coordinate into its integer modulo 2^32 and its fraction in [0, 1).
 ///
-/// Free of branches and of the processor's slow conversions, so that many go at once; exact below 2^51, which holds
-/// the millimetres of the horizon, where a ray along the plain may end.
+/// Free of branches and of slow conversions, so that it vectorises; exact below 2^51, which covers millimetre cells up to
+/// the horizon, where a ray along the plain may end.
 #[inline(always)]
 fn split(coordinate: f64) -> (u32, f32) {
     let nearest = (coordinate + ROUND) - ROUND;
@@ -263,7 +263,7 @@ pub(crate) fn cell_hash<const DIMENSIONS: usize>(cell: [u32; DIMENSIONS], seed: 
     hash
 }
 
-/// The lattice cell that holds a point, and the position in the cell, 0 to 1.
+/// The lattice cell that contains a point, and the position in the cell, 0 to 1.
 #[inline(always)]
 pub(crate) fn cell_of<const DIMENSIONS: usize>(
     lattice: [f64; DIMENSIONS],
@@ -324,7 +324,7 @@ impl ValueNoise<3> for Lattice<3> {
     }
 }
 
-/// Of an edge of a cell along x: the value of the first channel, the value of the second and its difference.
+/// Along an edge of a cell in x: the value of the first channel, the value of the second and its difference.
 #[inline(always)]
 fn edge((a0, b0): (f32, f32), (a1, b1): (f32, f32), wx: f32) -> (f32, f32, f32) {
     (a0 + wx * (a1 - a0), b0 + wx * (b1 - b0), b1 - b0)
@@ -346,7 +346,7 @@ mod tests {
         {
             assert_eq!(split(coordinate), (whole, fraction));
         }
-        // 2^40 lattice cells away only the fraction's bits are fewer.
+        // 2^40 lattice cells away only the fraction has fewer bits.
         let far = -((1i64 << 40) as f64) - 0.25;
         assert_eq!(split(far), ((-(1i64 << 40) - 1) as u32, 0.75));
     }
@@ -377,8 +377,8 @@ mod tests {
 
     #[test]
     fn slopes_are_the_gradient_of_the_second_channel() {
-        // The second channel's value is read off by integrating its gradient between lattice points,
-        // where it must equal the difference of the lattice's own numbers.
+        // The second channel's value follows by integrating its gradient between lattice points, where it must equal the
+        // difference of the lattice's own numbers.
         let integral: f64 = (0..20_000)
             .map(|k| {
                 f64::from(Lattice::noise([(f64::from(k) + 0.5) / 20_000.0 + 4.0, 7.0], 9).1[0]) / 20_000.0

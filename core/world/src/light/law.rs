@@ -1,7 +1,7 @@
 //! The laws by which a surface reflects the sun: lunar–Lambert, or Hapke's.
 //!
-//! Both are written as `r = μ0 f(μ0, μ, g; A)`, radiance in the unit of a white Lambert surface that faces a sun of
-//! irradiance 1, with `f` symmetric in μ0 and μ: light may run either way (Helmholtz).
+//! Both have the form `r = μ0 f(μ0, μ, g; A)`, radiance in the unit of a white Lambert surface that faces a sun of
+//! irradiance 1, with `f` symmetric in μ0 and μ (Helmholtz reciprocity).
 //!
 //! ```text
 //! lunar–Lambert  f = A [ 2L/(m0 + m) + (1 − L) ]
@@ -11,11 +11,11 @@
 //! roughness      m = sqrt(μ² + s²),  s = tan(mean slope)
 //! ```
 //!
-//! The last line is ours: a level plain seen or lit at a grazing angle consists of slopes too fine to be drawn
-//! that hide one another, so that its effective cosine does not go to 0. Without it a plain under a low sun
-//! shines at the horizon three times as bright as at one's feet. It is symmetric and keeps Helmholtz's law.
+//! The last line is ours: a level plain seen or lit at a grazing angle consists of slopes below the resolution that hide
+//! one another, so that its effective cosine does not approach 0. Without it a plain under a low sun is three times as
+//! bright at the horizon as near the camera. It is symmetric and preserves reciprocity.
 //!
-//! The albedo A of a texture is, for Hapke's law, the reflectance under light from everywhere:
+//! The albedo A of a texture is, for Hapke's law, the reflectance under uniform light from all directions:
 //! `A = (1 − γ)/(1 + γ)`, so `γ = (1 − A)/(1 + A)` and `w = 1 − γ²`: soil of 0.26 has w = 0.66, rock of 0.19 has 0.54.
 //!
 //! | symbol | name | unit |
@@ -37,7 +37,7 @@ use crate::scenario::{Reflectance, SunSettings};
 pub(crate) struct Law {
     kind: Reflectance,
     lunar: f32,
-    /// s², without unit.
+    /// s², dimensionless.
     roughness: f32,
     lobe: f32,
     backscatter: f32,
@@ -45,7 +45,7 @@ pub(crate) struct Law {
     surge_width: f32,
 }
 
-/// 1/x^{3/2}.
+/// x^{−3/2}.
 #[inline(always)]
 fn inverse_three_halves(x: f32) -> f32 {
     1.0 / (x * x.sqrt())
@@ -113,7 +113,7 @@ mod tests {
         [law(|_| {}), law(|s| s.reflectance = Reflectance::Hapke)]
     }
 
-    /// Light sent into the whole hemisphere, over the light that arrives: (1/π) ∫ r μ dω / μ0.
+    /// Light reflected into the whole hemisphere over the incident light: (1/π) ∫ r μ dω / μ0.
     fn hemispherical(law: &Law, albedo: f32, incidence: f32) -> f64 {
         let count = 40_000u32;
         let sine = (1.0 - incidence * incidence).sqrt();
@@ -197,7 +197,7 @@ mod tests {
         let [lunar, hapke] = laws();
         let plain = law(|s| (s.reflectance, s.hapke_surge) = (Reflectance::Hapke, 0.0));
         assert_eq!(ratio(&lunar, 6.0), 1.0);
-        // B falls to a half where tan(g/2) = h: by 5.7° the surge must be half gone; that is not the lobe's doing.
+        // B falls to a half where tan(g/2) = h: by 5.7° the surge must be half gone; the lobe does not change that fast.
         assert!(ratio(&hapke, 5.725) > 1.2, "{}", ratio(&hapke, 5.725));
         assert!(ratio(&plain, 5.725) < 1.05, "{}", ratio(&plain, 5.725));
         assert!((hapke.opposition(5.725f32.to_radians().cos()) - 0.5).abs() < 1e-3);

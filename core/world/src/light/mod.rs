@@ -1,4 +1,4 @@
-//! The light on it: sun, sky and reflection.
+//! The light: sun, sky and reflection.
 
 pub(crate) mod sky;
 pub(crate) mod law;

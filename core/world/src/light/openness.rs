@@ -1,9 +1,9 @@
-//! How much of the sky the ground sees beside rocks: soft contact shadows in the ambient light.
+//! The part of the sky that the ground sees beside rocks: soft contact shadows in the ambient light.
 //!
-//! A rock of radius r at distance x hides about F = 0.4 (r/x)³ of the sky's light on level ground: the form
-//! factor of half a disc is 0.21 (r/x)³ far off (area πr²/2, its middle 0.42 r high) and nears one half
-//! where it touches. The sum over the rocks is kept on a 4 cm grid as 1/(1 + ΣF) and read bilinearly.
-//! It only scales the sky's light, so nothing geometric depends on it.
+//! A rock of radius r at distance x hides about F = 0.4 (r/x)³ of the sky's light on level ground: the form factor of half
+//! a disc is 0.21 (r/x)³ far off (area πr²/2, its centroid 0.42 r high) and approaches one half where it touches. A 4 cm
+//! grid stores 1/(1 + ΣF), summed over the rocks and interpolated bilinearly. It only scales the sky's light, so no
+//! geometry depends on it.
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
@@ -15,10 +15,10 @@ use crate::ground::rocks::Rock;
 
 /// Side of a cell, m.
 const CELL_M: f64 = 0.04;
-/// How far a rock's influence is followed, in radii: 0.4/5³ is 0.3 %.
+/// Distance up to which a rock has influence, in radii: 0.4/5³ is 0.3 %.
 const REACH: f64 = 5.0;
 
-/// The part of the sky that the ground sees.
+/// The visible part of the sky over the ground.
 #[derive(Clone, Debug)]
 pub(crate) struct Openness {
     origin_m: [f64; 2],
@@ -27,7 +27,7 @@ pub(crate) struct Openness {
 }
 
 impl Openness {
-    /// Over the rectangle `x_m` × `y_m` of the site frame.
+    /// For the rectangle `x_m` × `y_m` of the site frame.
     pub(crate) fn new(rocks: &[Rock], x_m: [f64; 2], y_m: [f64; 2]) -> Self {
         let size = [x_m, y_m].map(|[from, to]| ((to - from) / CELL_M) as usize + 2);
         let origin_m = [x_m[0], y_m[0]];
@@ -53,7 +53,7 @@ impl Openness {
         Self { origin_m, size, part: hidden.into_iter().map(|f| 1.0 / (1.0 + f)).collect() }
     }
 
-    /// The part of the sky seen from the ground at a place, 0 to 1.
+    /// The part of the sky visible from the ground at a point, 0 to 1.
     #[inline(always)]
     pub(crate) fn at(&self, x_m: f64, y_m: f64) -> f32 {
         let (x, y) = ((x_m - self.origin_m[0]) / CELL_M, (y_m - self.origin_m[1]) / CELL_M);

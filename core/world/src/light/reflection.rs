@@ -1,10 +1,10 @@
-//! Light: a sun with hard shadows, a dome of sky, and what surfaces send of it to the camera.
+//! Light: a sun with hard shadows, a sky dome, and the radiance that surfaces reflect to the camera.
 //!
-//! Light is scaled so that level ground gets 1 in all under the sun of the settings: the sky's part f
-//! (`diffuse_fraction`, or from `optical_depth`: `sky.rs`) and the sun's 1 − f. Under another sun
-//! ([`Light::under`]) the scale stays: without an optical depth the sun keeps its strength and the sky its light;
-//! with one, both follow the dust. Radiance is in the unit in which a white Lambert surface under light 1 has
-//! radiance 1 (π is left out; exposure scales everything).
+//! Light is scaled so that level ground gets 1 in total under the sun of the settings: the sky's fraction f
+//! (`diffuse_fraction`, or from `optical_depth`: `sky.rs`) and the sun's 1 − f. Under another sun ([`Light::under`]) the
+//! scale stays: without an optical depth the sun keeps its strength and the sky its light; with one, both follow from the
+//! dust. Radiance is in the unit in which a white Lambert surface under light 1 has radiance 1 (π is left out; exposure
+//! scales everything).
 //!
 //! ```text
 //! lit by the sun:  r = E_sun · law(A; μ0, μ, g)                                          law.rs
@@ -12,16 +12,16 @@
 //! lit by ground:   r = A · A_ground E_level (1 − n_up)/2
 //! ```
 //!
-//! The glow around the sun is taken as light from the sun's direction whose cosine is softened,
-//! `c⁺ = (c + sqrt(c² + 0.04))/2`, and that no single rock hides. E_level is all light on level ground.
+//! The glow around the sun is treated as light from the sun's direction with a softened cosine,
+//! `c⁺ = (c + sqrt(c² + 0.04))/2`, which no single rock hides. E_level is all light on level ground.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
 //! | μ0, μ, g | cosines of incidence and emission, phase angle | –, –, rad |
 //! | A | `albedo` | – |
 //! | n, s | normal; direction to the sun | – |
-//! | n_up | part of the normal that points up | – |
-//! | open | `sky_open`: part of the sky that nearby rocks leave | – |
+//! | n_up | upward component of the normal | – |
+//! | open | `sky_open`: fraction of the sky that nearby rocks leave visible | – |
 //!
 //! Frames: site; directions are unit. Sources: domain.md 11.1, 11.2; the softened glow is ours.
 
@@ -40,14 +40,14 @@ pub(crate) struct Light {
     /// Irradiance of a plane that faces the sun.
     sun: f32,
     dome: Dome,
-    /// Irradiance by the glow per softened cosine.
+    /// Irradiance from the glow per softened cosine.
     glow: f32,
-    /// Radiance that level ground sends up.
+    /// Radiance that level ground reflects upwards.
     bounce: f32,
     law: Law,
 }
 
-/// What a point of a surface looks like; by default black and level.
+/// Appearance of a surface point; black and level by default.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Appearance {
     /// Albedo, without unit.
@@ -61,7 +61,7 @@ fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// A cosine that fades softly into shadow.
+/// A cosine with a soft transition to 0.
 #[inline(always)]
 fn softened(cosine: f32) -> f32 {
     0.5 * (cosine + (cosine * cosine + 0.04).sqrt())
@@ -79,7 +79,7 @@ fn on_level_ground(settings: &SunSettings, elevation_rad: f64) -> [f64; 2] {
     split(optical_depth, elevation_rad).map(|part| part * factor)
 }
 
-/// The unit direction towards a sun of this azimuth and elevation, site frame (domain.md 1.5).
+/// Unit direction towards a sun of this azimuth and elevation, site frame (domain.md 1.5).
 pub(crate) fn to_sun(azimuth_deg: f64, elevation_deg: f64) -> Vector3 {
     let (azimuth_rad, elevation_rad) = (azimuth_deg.to_radians(), elevation_deg.to_radians());
     let (level, up) = (elevation_rad.cos(), elevation_rad.sin());
@@ -93,10 +93,10 @@ impl Light {
         Self::under(settings, ground_albedo, to_sun, 1.0)
     }
 
-    /// The light under a sun elsewhere (unit direction, site frame), its direct light times `direct_factor`.
+    /// The light under another sun (unit direction, site frame), with its direct light multiplied by `direct_factor`.
     ///
-    /// The sky keeps its light when a cloud dims the sun. A sun below the horizon gives none; the sky is then lit as by
-    /// a sun on it.
+    /// The sky keeps its light when a cloud dims the sun. A sun below the horizon gives none; the sky is then that of a
+    /// sun on the horizon.
     pub(crate) fn under(
         settings: &SunSettings,
         ground_albedo: f64,
@@ -104,7 +104,7 @@ impl Light {
         direct_factor: f64,
     ) -> Self {
         let up = -to_sun.z;
-        // Half a degree keeps the light of a sun on the horizon finite.
+        // A minimum of half a degree keeps the light of a sun on the horizon finite.
         let elevation_rad = up.clamp(-1.0, 1.0).asin().max(0.5f64.to_radians());
         let [direct, diffuse] = on_level_ground(settings, elevation_rad);
         let direct = if up > 0.0 { direct_factor * direct } else { 0.0 };
@@ -151,7 +151,7 @@ impl Light {
 mod tests {
     use super::*;
 
-    /// White Lambert ground without roughness sends back exactly the light that it gets.
+    /// White Lambert ground without roughness reflects exactly the light that it gets.
     fn level_light(light: &Light, in_sun: bool) -> f32 {
         let white = Appearance { albedo: 1.0, normal: [0.0, 0.0, -1.0] };
         light.reflected(&white, [0.0, 0.0, -1.0], in_sun, 1.0)
@@ -194,7 +194,7 @@ mod tests {
             light.reflected(&Appearance { albedo: 1.0, normal }, [0.0, 0.0, -1.0], false, 1.0)
         };
         let below = ambient([0.0, 0.0, 1.0]);
-        // All of the ground's 0.26 and hardly any of the glow, whose softened cosine nearly vanishes.
+        // All of the ground's 0.26 and little of the glow, whose softened cosine nearly vanishes.
         assert!((below - 0.26).abs() < 2e-3, "{below}");
     }
 
@@ -204,7 +204,7 @@ mod tests {
         let level = light.to_sun.xy().normalize();
         for (turn, side) in [(1.0, "towards the sun"), (-1.0, "away from it")] {
             let normal = [turn * level.x as f32, turn * level.y as f32, 0.0];
-            // Evenly spread directions of the upper half, each standing for the same solid angle.
+            // Uniformly spread directions of the upper half, each with the same solid angle.
             let count = 40_000u32;
             let seen: f64 = (0..count)
                 .map(|k| {
@@ -231,7 +231,7 @@ mod tests {
             let horizon = light.reflected(&soil, [-0.999_8, 0.0, -0.02], true, 1.0);
             let sky = light.sky([1.0, 0.0, 0.0]);
             assert!(horizon < 2.0 * feet && sky < 2.0 * feet, "{elevation_deg}: {feet} {horizon} {sky}");
-            // Below the sun the horizon does shine, by the glow at the sun's height.
+            // The horizon below the sun is bright because of the glow at the sun's elevation.
             let glow = 1.0 + 2.0 * (-elevation_deg as f32 / 15.0).exp();
             assert!((light.sky([-1.0, 0.0, 0.0]) / sky / glow - 1.0).abs() < 1e-4);
         }

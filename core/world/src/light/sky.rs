@@ -1,13 +1,13 @@
-//! The sky: how much light the dust leaves to the sun, and how bright the dome is where.
+//! The sky: the direct light that the dust transmits, and the radiance of the dome.
 //!
-//! **Split.** With optical depth τ and zenith angle z of the sun, level ground gets, per unit of the light at
-//! the top of the atmosphere on a level plane, `e^{−τ/cos z}` from the sun and `d(τ, z)` from the sky. d is the
-//! table of domain.md 11.1 (from Appelbaum & Flood's net flux), joined linearly in τ and in z; beyond 75° the
-//! last slope goes on, and without dust there is no light from the sky.
+//! **Split.** With optical depth τ and zenith angle z of the sun, level ground gets, per unit of the light at the top of
+//! the atmosphere on a level plane, `e^{−τ/cos z}` from the sun and `d(τ, z)` from the sky. d is the table of domain.md
+//! 11.1 (from Appelbaum & Flood's net flux), interpolated linearly in τ and in z; beyond 75° it is extrapolated with the
+//! last slope, and without dust there is no light from the sky.
 //!
-//! **Dome.** `L(γ) = N (1 + a e^{−γ/15°})`, γ from the sun; N makes the light on level ground what it should be:
-//! `∫ L cos θ dω / π = E_sky`, by quadrature over the dome. Nothing makes the horizon itself brighter: a low sun
-//! does so on its side, through γ.
+//! **Dome.** `L(γ) = N (1 + a e^{−γ/15°})`, γ from the sun; N scales the light on level ground to its required value:
+//! `∫ L cos θ dω / π = E_sky`, by quadrature over the dome. The horizon itself is not brighter; with a low sun it is so on
+//! the sun's side, through γ.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -37,16 +37,16 @@ const DIFFUSE: [[f64; 5]; 7] = [
     [0.385, 0.347, 0.298, 0.231, 0.162],
 ];
 
-/// The last interval that starts at or below `value`, and the position in it; beyond the ends it goes on.
+/// The last interval that starts at or below `value`, and the position in it; the end intervals extrapolate.
 fn place(axis: &[f64], value: f64) -> (usize, f64) {
     let last = axis.len().saturating_sub(2);
     let at = axis.iter().rposition(|start| *start <= value).unwrap_or(0).min(last);
     (at, (value - axis[at]) / (axis[at + 1] - axis[at]))
 }
 
-/// Direct and diffuse light on level ground per unit of light on a level plane above the dust.
+/// Direct and diffuse light on level ground per unit of light on a level plane above the dust, dimensionless.
 ///
-/// `elevation_rad` above 0; without unit.
+/// `elevation_rad` must be above 0.
 pub(crate) fn split(optical_depth: f64, elevation_rad: f64) -> [f64; 2] {
     let (row, v) = place(&DEPTHS, optical_depth);
     let (column, u) = place(&ZENITHS_DEG, 90.0 - elevation_rad.to_degrees());
@@ -55,7 +55,7 @@ pub(crate) fn split(optical_depth: f64, elevation_rad: f64) -> [f64; 2] {
     [(-optical_depth / elevation_rad.sin()).exp(), diffuse.max(0.0)]
 }
 
-/// Light on level ground from a dome of radiance `e^{−γ/15°}` around a sun at this height.
+/// Light on level ground from a dome of radiance `e^{−γ/15°}` around a sun at this elevation.
 pub(crate) fn glow_on_level_ground(elevation_rad: f64) -> f64 {
     const ROWS: usize = 60;
     const COLUMNS: usize = 120;
@@ -76,9 +76,9 @@ pub(crate) fn glow_on_level_ground(elevation_rad: f64) -> f64 {
 /// The dome over a site: its radiance, in the unit of a white Lambert surface under light 1.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Dome {
-    /// Radiance far from the sun; also the light on level ground that comes from the even part.
+    /// Radiance far from the sun; also the light of the uniform part on level ground.
     pub even: f32,
-    /// Light on level ground that comes from the glow around the sun.
+    /// Light of the glow around the sun on level ground.
     pub glow_on_level: f32,
     aureole: f32,
 }
@@ -104,7 +104,7 @@ mod tests {
 
     #[test]
     fn the_split_is_that_of_the_table() {
-        // domain.md 11.1, both numbers of some cells.
+        // domain.md 11.1, both values of some cells.
         for (depth, zenith_deg, direct, diffuse) in [
             (0.3, 0.0, 0.741, 0.201),
             (0.5, 60.0, 0.368, 0.411),
@@ -117,7 +117,7 @@ mod tests {
                 "{depth} {zenith_deg}: {sun} {sky}"
             );
         }
-        // Between rows and columns, and below the last column, it goes on evenly.
+        // Linear between rows and columns, and below the last column.
         let [_, sky] = split(0.4, 45f64.to_radians());
         assert!((sky - 0.306).abs() < 1e-9, "{sky}");
         let [_, sky] = split(0.3, 5f64.to_radians());
@@ -130,7 +130,7 @@ mod tests {
         for (elevation_deg, aureole) in [(6.0f64, 2.0), (42.0, 2.0), (90.0, 8.0)] {
             let dome = Dome::new(0.35, aureole, elevation_deg.to_radians());
             let (sin_sun, cos_sun) = elevation_deg.to_radians().sin_cos();
-            // Evenly spread directions, each standing for the same solid angle.
+            // Uniformly spread directions, each with the same solid angle.
             let count = 200_000;
             let sum: f64 = (0..count)
                 .map(|k| {

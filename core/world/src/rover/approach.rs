@@ -10,7 +10,7 @@
 pub(crate) fn distances_m(start_m: f64, end_m: f64, step_fraction: f64) -> Vec<f64> {
     let keep = 1.0 - step_fraction;
     let ratio = (start_m / end_m).ln() / (1.0 / keep).ln();
-    // A ratio that is whole but for rounding must not add a step.
+    // A ratio that is an integer up to rounding must not add a step.
     let steps = (ratio - 1e-9).ceil().max(0.0) as i32;
     (0..=steps).map(|step| start_m * keep.powi(step)).collect()
 }

@@ -1,9 +1,8 @@
-//! The rover's body as boxes: what casts its shadow, and what of it is seen.
+//! The rover's body as boxes: the parts that cast shadows, and those that cameras see.
 //!
-//! Each part is a box in the rover frame, `centre + a h_1 + b h_2 + c h_3` with a, b, c in [−1, 1]. A wheel is two
-//! boxes, one turned by 45° about the axle, that lie in the wheel's circle: their corners touch its rim. Wheels
-//! and arms follow the angles of the suspension. Mast and camera bar cast shadows and are never seen: the cameras
-//! look out of them.
+//! Each part is a box in the rover frame, `centre + a h_1 + b h_2 + c h_3` with a, b, c in [−1, 1]. A wheel is two boxes,
+//! one rotated by 45° about the axle, inscribed in the wheel's circle: their corners are on its rim. Wheels and arms
+//! follow the angles of the suspension. Mast and camera bar cast shadows and are never seen: the cameras are inside them.
 //!
 //! | part | size, m | source |
 //! |---|---|---|
@@ -26,13 +25,13 @@ const ARM_HALF_M: f64 = 0.025;
 /// A box of the rover.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct BodyPart {
-    /// What it is.
+    /// Name of the part.
     pub name: &'static str,
     /// Its centre, rover frame, m.
     pub centre: Point3,
     /// Three half-axes at right angles, from the centre to the middles of three faces, rover frame, m.
     pub half_axes: [Vector3; 3],
-    /// Whether it shows in pictures; its shadow is cast in any case.
+    /// Whether cameras see it; it casts its shadow in any case.
     pub is_seen: bool,
 }
 
@@ -56,7 +55,7 @@ fn arm(name: &'static str, from: Point3, to: Point3) -> BodyPart {
     }
 }
 
-/// The two boxes of a wheel, one turned by 45° against the other.
+/// The two boxes of a wheel, one rotated by 45° against the other.
 fn wheel(centre: Point3) -> [BodyPart; 2] {
     let across = Vector3::y() * (0.5 * WHEEL_WIDTH_M);
     let side_m = WHEEL_RADIUS_M * std::f64::consts::FRAC_1_SQRT_2;
@@ -66,7 +65,7 @@ fn wheel(centre: Point3) -> [BodyPart; 2] {
     [straight, turned].map(|half_axes| BodyPart { name: "wheel", centre, half_axes, is_seen: true })
 }
 
-/// The parts of the rover, its suspension having these angles.
+/// The parts of the rover at these suspension angles.
 pub(crate) fn parts(angles: &SuspensionAngles) -> Vec<BodyPart> {
     let mut parts = vec![
         upright("deck", [-0.90, -1.15, -0.37], [0.70, 1.15, -0.33], true),
@@ -119,7 +118,7 @@ mod tests {
         let all = || parts.iter().flat_map(corners);
         let lowest_m = all().map(|point| point.z).fold(f64::MIN, f64::max);
         let highest_m = all().map(|point| point.z).fold(f64::MAX, f64::min);
-        // A turned box of each wheel stands on the ground with its edge.
+        // The rotated box of each wheel stands on the ground with its edge.
         assert!((lowest_m - 0.294).abs() < 1e-12, "{lowest_m}");
         assert!((lowest_m - highest_m - 1.6).abs() < 0.02, "{highest_m}");
         assert_eq!(parts.iter().filter(|part| part.name == "wheel").count(), 12);

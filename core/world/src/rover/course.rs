@@ -1,22 +1,22 @@
-//! The course: a rover that is driven move by move over the ground, its true way recorded.
+//! The course: drives the rover move by move over the ground and records its true path.
 //!
-//! The rover's place is x, y of its frame's origin and its yaw; the suspension finds the rest. Each move ends
-//! in stops; the way between two stops is a leg of short pieces (5 cm, 5°), and in each piece the wheels
-//! advance by w (rover frame, x and y) while the rover truly moves by what slip leaves of it (`slip.rs`).
+//! The rover's place is x, y of its frame's origin and its yaw; the suspension determines the rest. Each move ends in
+//! stops; the path between two stops is a leg of short pieces (5 cm, 5°). In each piece the wheels advance by w (rover
+//! frame, x and y), and the true motion is w reduced by slip (`slip.rs`).
 //!
-//! **Driven blind** (`forward`, `arc`, `turn`): the wheels advance as commanded and the motion falls short.
-//! With the body's attitude A before a piece, its true turn δ and chord t (rover frame, x and y):
-//! `(x, y) += [A Rz(δ/2) (t, 0)]_xy`, `yaw += δ`; the chord of an arc is `sin(δ/2)/(δ/2)` of its length.
-//! Turning on the spot loses nothing to a slope (ours).
+//! **Open-loop** (`forward`, `arc`, `turn`): the wheels advance as commanded and the motion falls short. With the body's
+//! attitude A before a piece, its true rotation δ and chord t (rover frame, x and y): `(x, y) += [A Rz(δ/2) (t, 0)]_xy`,
+//! `yaw += δ`; the chord of an arc is `sin(δ/2)/(δ/2)` of its length. A slope causes no loss when turning on the spot
+//! (ours).
 //!
-//! **Driven until there** (`approach`, `crab`, `face_target`): the places are exact, and the wheels turn by
-//! more. The distance D of a stop is that from the left camera's centre, the mast pointed, to the targets'
-//! centre; the place on the line with a given D is found by false position. A crab turns the rover about the
-//! vertical through the targets' centre, so that on flat ground all its cameras move on circles.
+//! **Until arrival** (`approach`, `crab`, `face_target`): the places are exact, and the wheels advance by more. The
+//! distance D of a stop is that from the left camera's centre, with the mast pointed, to the targets' centre; the place on
+//! the line with a given D is found by false position. A crab rotates the rover about the vertical through the targets'
+//! centre, so that on flat ground all its cameras move on circles.
 //!
-//! A **staged slip** s (`rover.forced_slip`, `rover.stuck_from_stop`) overrides both: the wheels do what was
-//! commanded, the rover moves by 1 − s of it. In an approach the command is D of this stop less D of the one
-//! before; the way to the next stop starts from where the rover was left.
+//! A **forced slip** s (`rover.forced_slip`, `rover.stuck_from_stop`) overrides both: the wheels advance as commanded, the
+//! rover moves by 1 − s of it. In an approach the command is the D of this stop less that of the previous one; the path to
+//! the next stop starts from the rover's actual place.
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
@@ -36,13 +36,13 @@ use crate::rover::slip::{self, Slip};
 use crate::rover::suspension::Stand;
 use crate::scenario::{Course, Move};
 
-/// Nearest and farthest that a stop may be from the targets' centre, m (ours: nearer, the mast looks down on it).
+/// Smallest and largest distance of a stop from the targets' centre, m (ours: nearer, the mast would point down at it).
 const STOP_DISTANCES_M: [f64; 2] = [1.6, 60.0];
 
-/// A rover on its way.
+/// State of a drive in progress.
 struct Driver<'a> {
     scene: &'a Scene<'a>,
-    /// The setting that is to blame if it goes wrong.
+    /// The setting to name in an error.
     key: String,
     place: Place,
     leg: Leg,
@@ -54,7 +54,7 @@ pub(crate) fn first_stop(scene: &Scene<'_>) -> Result<TrueStop> {
     Driver::start(scene)?.look()
 }
 
-/// Drives the whole course; fails, naming the setting, where the rover cannot go or the mast cannot look.
+/// Drives the whole course; fails, naming the setting, where the rover cannot go or the mast cannot point.
 pub(crate) fn drive(scene: &Scene<'_>) -> Result<TrueDrive> {
     let settings = scene.drive;
     let mut driver = Driver::start(scene)?;
@@ -94,7 +94,7 @@ impl<'a> Driver<'a> {
         Ok(driver)
     }
 
-    /// Fails where a wheel stands against a rock that it cannot climb.
+    /// Fails if a wheel is against a rock that it cannot climb.
     fn check_way(&self, stand: &Stand) -> Result<()> {
         self.scene.blocked(stand).map_or(Ok(()), |(at, height_m)| {
             let problem = format!(
@@ -114,12 +114,12 @@ impl<'a> Driver<'a> {
         self.leg.stands[self.leg.stands.len() - 1]
     }
 
-    /// The slip staged for the present leg.
+    /// The slip forced on the current leg.
     fn forced_slip(&self) -> Option<f64> {
         self.scene.rover.forced_slip_to(self.drive.stops.len())
     }
 
-    /// The stop that the rover stands at.
+    /// The stop at the rover's current place.
     fn look(&self) -> Result<TrueStop> {
         let stand = self.stand();
         let number = self.drive.stops.len();
@@ -146,7 +146,7 @@ impl<'a> Driver<'a> {
         Ok(())
     }
 
-    /// Ends a piece at a place, the wheels having advanced along its chord and turned it by `turn_rad`.
+    /// Ends a piece at a place; the wheels have advanced along its chord and turned it by `turn_rad`.
     fn advance(&mut self, place: Place, wheels_m: [f64; 2], turn_rad: f64) -> Result<()> {
         self.scene.cancel.check()?;
         let stand = self.scene.settle(place).ok_or_else(|| {
@@ -165,7 +165,7 @@ impl<'a> Driver<'a> {
         Ok(())
     }
 
-    /// Drives blind: the wheels advance by `length_m` while the rover is to turn by `turn_rad`.
+    /// Open-loop: the wheels advance by `length_m` while the rover is commanded to turn by `turn_rad`.
     fn roll(&mut self, length_m: f64, turn_rad: f64) -> Result<()> {
         let pieces = pieces(length_m, turn_rad);
         let forced = self.forced_slip();
@@ -185,7 +185,7 @@ impl<'a> Driver<'a> {
         Ok(())
     }
 
-    /// Drives until there: along a way whose places are reached exactly, unless slip is staged.
+    /// Until arrival: follows a path whose places are reached exactly, unless slip is forced.
     fn follow(&mut self, way: &[Place]) -> Result<()> {
         let (start, mut before) = (self.place, self.place);
         let forced = self.forced_slip();
@@ -202,7 +202,7 @@ impl<'a> Driver<'a> {
         Ok(())
     }
 
-    /// The wheel advance that takes the rover to a near place on its slope and soil.
+    /// The wheel advance that moves the rover to a nearby place on its slope and soil.
     fn wheels_to(&self, next: Place) -> Result<[f64; 2]> {
         let level_m = self.place.motion_to(next);
         let level_length_m = level_m[0].hypot(level_m[1]);
@@ -211,7 +211,7 @@ impl<'a> Driver<'a> {
         }
         let direction = level_m.map(|component| component / level_length_m);
         let attitude = self.stand().site_from_rover.rotation;
-        // On a slope the way is longer than its plan.
+        // On a slope the path is longer than its horizontal projection.
         let rise = (attitude * Vector3::new(direction[0], direction[1], 0.0)).xy().norm();
         slip::on_slope(self.scene.rover, &attitude, direction)
             .wheels_from_true(direction, level_length_m / rise)
@@ -222,7 +222,7 @@ impl<'a> Driver<'a> {
             })
     }
 
-    /// Drives one move.
+    /// Makes one move.
     fn make(&mut self, one: &Move) -> Result<()> {
         match *one {
             Move::Forward { distance_m, stops } => self.roll_to_stops(distance_m, 0.0, stops),
@@ -260,14 +260,14 @@ impl<'a> Driver<'a> {
         Ok(())
     }
 
-    /// The turn in place after which the targets' centre lies ahead; nothing if it does.
+    /// The turn in place that brings the targets' centre straight ahead; empty if it already is.
     fn facing(&self) -> Vec<Place> {
         let facing = Place { yaw_rad: self.scene.azimuth_rad(self.place), ..self.place };
         let is_turned = wrapped(facing.yaw_rad - self.place.yaw_rad).abs() > 1e-12;
         if is_turned { self.place.way_to(facing).collect() } else { Vec::new() }
     }
 
-    /// Drives to a stop at each distance D but the first, which is that of the present place.
+    /// Drives to a stop at each distance D but the first, which is that of the current place.
     fn approach(&mut self, distances_m: &[f64]) -> Result<()> {
         for pair in distances_m.windows(2) {
             let azimuth_rad = self.scene.azimuth_rad(self.place);

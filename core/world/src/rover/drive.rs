@@ -1,7 +1,7 @@
-//! The drive of a scenario as it truly goes in its world: its stops and ways.
+//! The true drive of a scenario in its world: its stops and legs.
 //!
 //! In an approach the rover keeps its heading on the line to the targets' centre (`approach.rs`). Other courses:
-//! `course.rs`. What can be said of a drive before there is a world: `plan.rs`.
+//! `course.rs`. The plan of a drive, which needs no world: `plan.rs`.
 //!
 //! Frames: site and rover. Source: domain.md 5.4.
 
@@ -14,7 +14,7 @@ use crate::rover::scene::{Scene, TrueDrive, TrueStop};
 use crate::scenario::Scenario;
 use crate::world::World;
 
-/// Does something with the scene of a scenario's world.
+/// Calls a function with the scene of a scenario's world.
 pub(super) fn in_scene<T>(
     world: &World,
     scenario: &Scenario,
@@ -32,7 +32,7 @@ pub(super) fn in_scene<T>(
     })
 }
 
-/// The drive as it truly goes in the scenario's world.
+/// The true drive in the scenario's world.
 pub(crate) fn true_drive(world: &World, scenario: &Scenario, cancel: Cancel<'_>) -> Result<TrueDrive> {
     in_scene(world, scenario, cancel, course::drive)
 }

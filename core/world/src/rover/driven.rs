@@ -1,12 +1,12 @@
-//! A drive on commands: the true rover is moved step by step, each step a function of the stop before, the command and the
+//! A commanded drive: the true rover moves step by step, each step a function of the previous stop, the command and the
 //! scenario's seed.
 //!
-//! The rover rolls as a replayed one that is driven blind (`course.rs`): wheels advance as commanded, slip takes its share,
-//! the suspension settles on the ground after every 5 cm or 5°. The slip of a step is spread by `rover.slip_spread`. A wheel
-//! that meets a rock too high to climb ends the step where the rover stands.
+//! The rover rolls as in an open-loop replay (`course.rs`): wheels advance as commanded, slip reduces the motion, the
+//! suspension settles on the ground after every 5 cm or 5°. The slip of a step is spread by `rover.slip_spread`. A wheel
+//! that meets a rock too high to climb ends the step at the rover's current place.
 //!
-//! Everything random is drawn from the seed and the number of the stop, so that a list of [`DrivenStop`]s is the whole state:
-//! cut after any stop, it continues with the same bits.
+//! All random numbers follow from the seed and the index of the stop, so that a list of [`DrivenStop`]s is the whole
+//! state: truncated after any stop, it continues with the same bits.
 //!
 //! Frames: site and rover. Sources: domain.md 5.4, 5.5; papers.md R104, R107.
 
@@ -39,7 +39,7 @@ use crate::scenario::Scenario;
 use crate::traverse::{Stop, StopTruth, WheelPlaces};
 use crate::world::World;
 
-/// One stop of a drive on commands.
+/// One stop of a commanded drive.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DrivenStop {
@@ -49,52 +49,52 @@ pub struct DrivenStop {
     pub true_site_from_rover: PoseRecord,
     /// The estimated pose.
     pub site_from_rover: PoseRecord,
-    /// Error of the estimated attitude, roll, pitch, yaw, rad, of wheels and IMU.
+    /// Error of the estimated attitude (roll, pitch, yaw), rad; used by the odometry model `wheels_and_imu`.
     pub attitude_error_rad: [f64; 3],
-    /// The angles to which the mast was pointed; `None` without a mast.
+    /// The angles at which the mast was pointed; `None` without a mast.
     pub mast_angles: Option<MastAngles>,
-    /// The angles to which the mast was pointed for a pair that visual odometry took of its own; `None` without one.
+    /// The mast angles of a pair that visual odometry took in addition; `None` without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub odometry_look: Option<MastAngles>,
-    /// Centre of the exposure subframe in the left image, px; the image's centre where `None`.
+    /// Centre of the exposure subframe in the left image, px; `None` for the image's centre.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub metered_px: Option<Pixel>,
     /// Length of the wheels' path to this stop, m.
     pub wheels_m: f64,
     /// Duration of the drive to this stop, s.
     pub drive_s: f64,
-    /// Part of the commanded motion that was completed, 0 to 1; less than 1 where a wheel met too high a rock.
+    /// Completed fraction of the commanded motion, 0 to 1; below 1 if a wheel met a rock that is too high.
     pub completed: f64,
-    /// Rocks whose corners are inside the rover's body here.
+    /// Number of rocks with a vertex inside the rover's body at this stop.
     pub touched_rocks: u32,
-    /// The places that the wheels passed on the way here, site frame, m; none where they leave no tracks.
+    /// Wheel positions on the motion to this stop, site frame, m; empty if the wheels leave no tracks.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub wheel_places_m: Vec<WheelPlaces>,
-    /// How vision measured the motion to this stop; `None` where it did not.
+    /// Visual odometry's measurement of the motion to this stop; `None` without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub odometry: Option<MeasuredMotion>,
     /// Whether visual odometry runs alone at this stop.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub odometry_alone: bool,
-    /// The target at which the mast was pointed here; `None` before that.
+    /// The target at which the mast was pointed at this stop; `None` before that.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mast_target: Option<Designation>,
-    /// The pair on the body that took over from the main one here; `None` where the main one looks for the target.
+    /// The pair on the body that takes over from the main one at this stop; `None` if the main pair tracks the target.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub handed_to: Option<CameraName>,
-    /// Tilt of the rover by the accelerometers, deg; `None` where the estimated pose still has it.
+    /// Tilt of the rover from the accelerometers, deg; `None` if the estimated pose still contains it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub measured_tilt_deg: Option<f64>,
-    /// The first stage that was put off because the drive is paused here: `point_mast` or `capture`; `None` if none was.
+    /// The first stage postponed because the drive is paused at this stop: `point_mast` or `capture`; `None` without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub awaits: Option<CycleStage>,
 }
 
 impl DrivenStop {
-    /// The first stop of a scenario's drive, its mast pointed at the targets' centre.
+    /// The first stop of a scenario's drive, with the mast pointed at the targets' centre.
     ///
     /// # Errors
-    /// A scenario whose rover cannot stand there, or [`Error::Cancelled`].
+    /// A scenario whose rover cannot settle there, or [`Error::Cancelled`].
     pub fn first(world: &World, scenario: &Scenario, cancel: Cancel<'_>) -> Result<Self> {
         let stop = first_stop(world, scenario, cancel)?;
         let pose = PoseRecord::from(&stop.site_from_rover);
@@ -120,11 +120,11 @@ impl DrivenStop {
         })
     }
 
-    /// The stop after this one, which has the number `number`, when the wheels advance by `length_m` while the rover is to
-    /// turn by `turn_rad`. Its mast angles are those of this stop.
+    /// The next stop, of index `number`, after the wheels advance by `length_m` while the rover is commanded to turn by
+    /// `turn_rad`. Its mast angles are those of this stop.
     ///
     /// # Errors
-    /// Ground on which the wheels find no stand, or [`Error::Cancelled`].
+    /// Ground on which the suspension does not settle, or [`Error::Cancelled`].
     pub fn next(
         &self,
         world: &World,
@@ -163,7 +163,7 @@ impl DrivenStop {
         })
     }
 
-    /// The stop after this one when the rover does not move.
+    /// The next stop if the rover does not move.
     #[must_use]
     pub fn stay(&self) -> Self {
         Self {
@@ -173,7 +173,7 @@ impl DrivenStop {
             odometry_look: None,
             metered_px: None,
             completed: 1.0,
-            // A rock is counted at the stop at which it was reached.
+            // A rock is counted at the stop at which it is reached.
             touched_rocks: 0,
             wheel_places_m: Vec::new(),
             odometry: None,
@@ -185,8 +185,8 @@ impl DrivenStop {
         }
     }
 
-    /// Keeps how vision measured the motion to this stop, and corrects the estimated pose by it, the next steps' heading too.
-    /// `before` is the estimated pose at the stop before.
+    /// Stores visual odometry's measurement of the motion to this stop and corrects the estimated pose by it, and thereby
+    /// the heading of the following steps. `before` is the estimated pose at the previous stop.
     pub fn correct(&mut self, measured: MeasuredMotion, before: &Pose) {
         let pose = measured.pose_after(before);
         self.measured_tilt_deg = Some(self.tilt_deg());
@@ -200,7 +200,7 @@ impl DrivenStop {
         self.odometry = Some(measured);
     }
 
-    /// Rolls the true rover; the leg and the part of the motion that was completed.
+    /// Rolls the true rover; returns the leg and the completed fraction of the motion.
     fn roll(
         &self,
         scene: &Scene<'_>,
@@ -243,10 +243,10 @@ impl DrivenStop {
         Ok((leg, 1.0))
     }
 
-    /// Refuses implausible numbers, as a file may have them.
+    /// Rejects implausible values, which a file may contain.
     ///
     /// # Errors
-    /// A sentence that begins with the field.
+    /// A message that begins with the field.
     pub fn check(&self) -> Result<(), String> {
         for (field, pose) in
             [("true_site_from_rover", &self.true_site_from_rover), ("site_from_rover", &self.site_from_rover)]
@@ -264,7 +264,7 @@ impl DrivenStop {
         Ok(())
     }
 
-    /// Angle between the rover's vertical and that of the site by the accelerometers, deg.
+    /// Tilt of the rover from the accelerometers: angle between the vertical axes of rover and site, deg.
     pub fn tilt_deg(&self) -> f64 {
         self.measured_tilt_deg.unwrap_or_else(|| {
             let down = self.site_from_rover.to_pose().rotation * Vector3::z();
@@ -273,7 +273,7 @@ impl DrivenStop {
     }
 }
 
-/// The stops of a traverse's index for stops that were driven, with images to be rendered.
+/// The stops of a traverse's index for the stops of a commanded drive, with images to be rendered.
 pub fn index_stops(driven: &[DrivenStop], scenario: &Scenario) -> Vec<Stop> {
     let rigs = Rigs::new(&scenario.camera);
     let told: Vec<MastAngles> = driven.iter().filter_map(|stop| stop.mast_angles).collect();

@@ -1,4 +1,4 @@
-//! Drives over level ground and against rocks, and one that is cut.
+//! Drives over level ground and against rocks, and a truncated one.
 
 use super::*;
 
@@ -55,7 +55,7 @@ fn a_drive_cut_after_any_stop_continues_with_the_same_bits() {
         let kept: DrivenStop = serde_json::from_str(&text).unwrap();
         let next = kept.next(&world, &scenario, 3, motions[2], Cancel::default()).unwrap();
         assert_eq!(next, whole[3]);
-        // Uphill the wheels lose some of their advance, and not the same part at each step.
+        // Uphill the wheels lose some of their advance, a different fraction at each step.
         let advance = |k: usize| {
             let [a, b] =
                 [&whole[k - 1], &whole[k]].map(|s| s.true_site_from_rover.to_pose().translation.vector);
@@ -76,7 +76,7 @@ fn a_wheel_against_a_high_rock_stalls_where_it_stands() {
         yaw_deg: 180.0,
         shape: crate::scenario::RockShape::Block,
     };
-    // 10.3 m ahead lies the targets' centre; a rock 2 m ahead of the right front wheel.
+    // The targets' centre is 10.3 m ahead; a rock is 2 m ahead of the right front wheel.
     scenario.rocks.placed = vec![rock(-10.3 + 2.7, 0.53)];
     let world = World::new(&scenario);
     let stops = drive(&scenario, &world, &[[4.0, 0.0], [-0.5, 0.0]]);

@@ -1,13 +1,13 @@
-//! Where the mast truly looks when it is told where to look.
+//! True mast angles for commanded ones.
 //!
 //! ```text
 //! true = play(told) + offset + noise
 //! play: q_i = clamp(q_{i−1}, told_i − B/2, told_i + B/2), from q = 0 on before the first stop
 //! ```
 //!
-//! The play of a gear lets the head rest until the drive has moved beyond it: after turning to the right it
-//! lags by half the play, after turning to the left it leads by as much. The tracker is given what was told;
-//! only the renderer knows the rest.
+//! The backlash (play) of a gear leaves the head at rest until the drive has moved beyond it: after turning to the right
+//! it lags by half the play, after turning to the left it leads by as much. The tracker is given the commanded angles;
+//! only the renderer uses the true ones.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -23,9 +23,9 @@ use crate::ground::texture::mix;
 use crate::scenario::{DriveSettings, Scenario};
 use sightline_geometry::camera::MastAngles;
 
-/// The head before the first stop.
+/// The head's angles before the first stop.
 const AHEAD: MastAngles = MastAngles { azimuth_rad: 0.0, elevation_rad: 0.0 };
-/// Added to the number of a stop for the random error of a further look.
+/// Added to the index of a stop to seed the random error of an additional look.
 const LOOK: usize = 1 << 20;
 
 /// Whether the true mast angles differ from the measured ones.
@@ -33,7 +33,7 @@ pub(crate) fn is_present(drive: &DriveSettings) -> bool {
     drive.pointing_error_deg > 0.0 || drive.mast_backlash_deg > 0.0 || drive.mast_offset_deg != [0.0; 2]
 }
 
-/// The angles that the mast truly takes when told `told`, one after the other, the mast starting straight ahead.
+/// The true mast angles for the commands `told`, in order, starting from straight ahead.
 pub(crate) fn true_angles(told: &[MastAngles], scenario: &Scenario) -> Vec<MastAngles> {
     let mut head = AHEAD;
     told.iter()
@@ -45,7 +45,7 @@ pub(crate) fn true_angles(told: &[MastAngles], scenario: &Scenario) -> Vec<MastA
         .collect()
 }
 
-/// The head after it was told to turn, without offset and noise.
+/// The head's angles after a command, without offset and noise.
 fn turned(head: MastAngles, told: MastAngles, drive: &DriveSettings) -> MastAngles {
     let half_play_rad = 0.5 * drive.mast_backlash_deg.to_radians();
     let follow =
@@ -56,7 +56,7 @@ fn turned(head: MastAngles, told: MastAngles, drive: &DriveSettings) -> MastAngl
     }
 }
 
-/// The same for the pair that visual odometry takes of its own at a stop: the mast turns to it from straight ahead.
+/// The true angles for the additional pair of visual odometry at a stop: the mast turns to it from straight ahead.
 pub(crate) fn true_angles_of_look(told: MastAngles, scenario: &Scenario, stop: usize) -> MastAngles {
     with_noise(turned(AHEAD, told, &scenario.drive), scenario, stop | LOOK)
 }

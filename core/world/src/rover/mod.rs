@@ -1,8 +1,8 @@
-//! The rover that carries them: where it truly stands, and where it believes to stand.
+//! The rover: its true and its estimated poses.
 //!
-//! In the order in which to read: how it stands (`suspension`), what its wheels lose (`slip`), where it can be
-//! placed (`scene`), how it drives (`approach`, `course`), the scenario's drive (`plan`, `drive`), what it knows of
-//! it (`odometry`, `mast_error`), what it looks like (`body`) and what it leaves behind (`tracks`).
+//! In reading order: how it settles on the ground (`suspension`), slip (`slip`), where it can be placed (`scene`), how it
+//! drives (`approach`, `course`), the scenario's drive (`plan`, `drive`), pose estimates and pointing errors (`odometry`,
+//! `mast_error`), its body (`body`) and its tracks (`tracks`).
 
 pub(crate) mod suspension;
 pub(crate) mod slip;

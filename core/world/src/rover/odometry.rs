@@ -1,25 +1,25 @@
-//! What the rover believes of its way: the pose estimates.
+//! The rover's pose estimates.
 //!
-//! **Stated.** The first estimate is true. Each step's motion `t, R` (rover frame of the stop before) is
-//! seen as `t + a e_a + b e_b + c e_c` and `R · δR`: e_a along the motion, e_b and e_c across it, with
-//! a ~ N(0, (along · |t|)²), b, c ~ N(0, (across · |t|)²), and δR of roll, pitch and yaw ~ N(0, attitude²)
-//! each. Errors add up from step to step, as the tracker's prediction assumes (domain.md 5.5).
+//! **Stated.** The first estimate is true. Each step's motion `t, R` (rover frame of the previous stop) is measured as
+//! `t + a e_a + b e_b + c e_c` and `R · δR`: e_a along the motion, e_b and e_c across it, with a ~ N(0, (along · |t|)²),
+//! b, c ~ N(0, (across · |t|)²), and δR of roll, pitch and yaw ~ N(0, attitude²) each. Errors accumulate from step to
+//! step, as the tracker's prediction assumes (domain.md 5.5).
 //!
-//! **Wheels and IMU.** The first estimate is true. The way of a leg is what the wheels advanced, laid out along
-//! the believed attitude Â: `ŵ = Σ_k Â_k w_k`. Wheels that slip are believed, so slip is an error of this
-//! estimate and in no covariance. The position grows by `ŵ + a e_a + b e_b + c e_c` with a ~ N(0, (along · L)²),
-//! b, c ~ N(0, (across · L)²). Attitude: roll and pitch are the true ones plus N(0, attitude²), drawn anew by the
-//! accelerometers at each stop and kept until the next; yaw is the true one plus the gyro's error, which grows
-//! over a leg of duration T by `bias · T + walk · sqrt(T) · N(0, 1)`, evenly within it. The gyro is read while
-//! the rover drives (domain.md 5.4), not at stops.
+//! **Wheels and IMU.** The first estimate is true. The motion of a leg is the wheels' advance integrated along the
+//! estimated attitude Â: `ŵ = Σ_k Â_k w_k`. Slip is not detected, so it is an error of this estimate and in no covariance.
+//! The position grows by `ŵ + a e_a + b e_b + c e_c` with a ~ N(0, (along · L)²), b, c ~ N(0, (across · L)²). Attitude:
+//! roll and pitch are the true ones plus N(0, attitude²), redrawn by the accelerometers at each stop and constant until
+//! the next; yaw is the true one plus the gyro's error, which grows over a leg of duration T by
+//! `bias · T + walk · sqrt(T) · N(0, 1)`, linearly within it. The gyro is integrated while the rover drives (domain.md
+//! 5.4), not at stops.
 //!
-//! **Heading jumps** (`rover.heading_jumps`) turn the estimate about the rover's own vertical from their stop on; the way
-//! that follows is laid out along the turned heading.
+//! **Heading jumps** (`rover.heading_jumps`) rotate the estimate about the rover's own vertical from their stop on; the
+//! following motion is integrated along the rotated heading.
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
-//! | t, R | motion and turn between two stops | m, rover frame of the first |
-//! | w, Â | `wheels_m`, believed attitude | m, rover frame; site from rover |
+//! | t, R | translation and rotation between two stops | m, rover frame of the first |
+//! | w, Â | `wheels_m`, estimated attitude | m, rover frame; site from rover |
 //! | L, T | `driven_m`, `duration_s` of a leg | m, s |
 //!
 //! Frames: site and rover. Sources: domain.md 5.5 (noise, gyro); papers.md R10, R126.
@@ -35,10 +35,10 @@ use crate::ground::texture::mix;
 use crate::rover::scene::{Leg, TrueDrive};
 use crate::scenario::{FaultKind, HeadingJump, OdometryModel, RoverSettings, Scenario};
 
-/// Seconds of an hour.
+/// Seconds per hour.
 const HOUR_S: f64 = 3600.0;
 
-/// Turn of the estimated heading by an injected fault, clockwise from above, deg.
+/// Jump of the estimated heading by an injected fault, clockwise from above, deg.
 const FAULT_JUMP_DEG: f64 = 7.0;
 
 /// The jumps of the estimated heading: those of the scenario, and those of injected faults.
@@ -66,7 +66,7 @@ pub fn believed(drive: &TrueDrive, scenario: &Scenario) -> Vec<Pose> {
     with_heading_jumps(&believed, &jumps)
 }
 
-/// The estimates with their heading turned from some stops on.
+/// The estimates with their headings rotated from the given stops on.
 pub(crate) fn with_heading_jumps(estimates: &[Pose], jumps: &[HeadingJump]) -> Vec<Pose> {
     let mut turned: Vec<Pose> = estimates.first().copied().into_iter().collect();
     for (number, pair) in estimates.windows(2).enumerate() {
@@ -90,7 +90,7 @@ pub fn estimates(true_poses: &[Pose], error: &OdometryError, seed: u64) -> Vec<P
     estimates
 }
 
-/// One step's motion as it is seen under the stated errors.
+/// One step's motion with the stated errors added.
 fn stated_step(before_from_after: &Pose, error: &OdometryError, mut normal: impl FnMut() -> f64) -> Pose {
     let motion = before_from_after.translation.vector;
     let length_m = motion.norm();
@@ -108,17 +108,17 @@ fn stated_step(before_from_after: &Pose, error: &OdometryError, mut normal: impl
     Pose::from_parts(Translation3::from(seen), before_from_after.rotation * tilt)
 }
 
-/// The estimate at one stop of a drive whose legs become known one after the other.
+/// The estimate at one stop of a drive whose legs are added one by one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Belief {
     /// The estimated pose.
     pub(crate) pose: Pose,
-    /// Error of the attitude: roll, pitch, yaw, rad; of `wheels_and_imu` alone.
+    /// Error of the attitude: roll, pitch, yaw, rad; used by `wheels_and_imu` only.
     pub(crate) attitude_error_rad: [f64; 3],
 }
 
 impl Belief {
-    /// The estimate after a leg that ends at stop `number`, `poses` being the true ones at its ends.
+    /// The estimate after a leg that ends at stop `number`; `poses` are the true ones at its ends.
     pub(crate) fn after(&self, leg: &Leg, poses: [&Pose; 2], number: usize, scenario: &Scenario) -> Self {
         let stop_seed = mix(scenario.seed ^ mix(number as u64 ^ 0xac71_0d03));
         let mut random = Pcg64::new(u128::from(stop_seed), 0xac71_0d03_0d03_72ad);
@@ -148,7 +148,7 @@ impl Belief {
     }
 }
 
-/// The unit vectors along a motion, across it in the level, and across both; forward for none.
+/// The unit vectors along a motion, horizontally across it, and across both; for no motion, along x.
 fn axes_of(motion: &Vector3) -> [Vector3; 3] {
     let length_m = motion.norm();
     let along = if length_m > 0.0 { motion / length_m } else { Vector3::x() };
@@ -156,7 +156,7 @@ fn axes_of(motion: &Vector3) -> [Vector3; 3] {
     [along, across, along.cross(&across)]
 }
 
-/// What is wrong with the believed attitude, rad.
+/// Error of the estimated attitude, rad.
 #[derive(Clone, Copy, Default)]
 struct AttitudeError {
     roll: f64,
@@ -196,7 +196,7 @@ pub(crate) fn wheels_and_imu(
 struct Sensors<'a> {
     error: &'a OdometryError,
     bias_rad_per_s: f64,
-    /// Of the gyro, rad/√s.
+    /// Angle random walk of the gyro, rad/√s.
     walk_rad: f64,
     tilt_rad: f64,
 }
@@ -212,7 +212,7 @@ impl<'a> Sensors<'a> {
         }
     }
 
-    /// The estimate after a leg that ends with a true attitude; attitude error and position are those before it.
+    /// The estimate after a leg that ends with a true attitude; attitude error and position are those before the leg.
     fn leg(
         &self,
         leg: &Leg,
@@ -239,7 +239,7 @@ impl<'a> Sensors<'a> {
     }
 }
 
-/// The wheels' way of a leg along the believed attitude, site frame, m.
+/// The wheels' path of a leg along the estimated attitude, site frame, m.
 fn believed_way(leg: &Leg, at_start: AttitudeError, drift_rad: f64) -> Vector3 {
     let pieces = leg.wheels_m.len() as f64;
     let ways = leg.stands.windows(2).zip(&leg.wheels_m).enumerate().map(|(k, (ends, [x, y]))| {
@@ -261,7 +261,7 @@ mod tests {
         let drive: Vec<Pose> = (0..5).map(|stop| Pose::translation(f64::from(stop), 0.0, 0.0)).collect();
         let jumps = [HeadingJump { stop: 2, yaw_deg: 30.0 }];
         let turned = with_heading_jumps(&drive, &jumps);
-        // The jump happens at the stop: the way there is untouched, the next metre leads 30° to the right.
+        // The jump is at the stop: the path to it is unchanged, the next metre leads 30° to the right.
         for stop in 0..2 {
             assert!((turned[stop].translation.vector - drive[stop].translation.vector).norm() < 1e-12);
         }

@@ -1,7 +1,7 @@
-//! The plan of a drive: what can be said of it before there is a world.
+//! The plan of a drive, computed before its world exists.
 //!
-//! Rocks, ground and settings must know where the drive leads before the world exists: [`planned`] drives the
-//! course over flat ground without slip, the targets' centre lying on the ground.
+//! Rocks, ground and settings need the path of the drive before the world exists: [`planned`] drives the course over flat
+//! ground without slip, with the targets' centre on the ground.
 //!
 //! Frames: site and rover, m. Source: domain.md 5.4.
 
@@ -18,21 +18,21 @@ use crate::rover::scene::{Scene, TrueDrive};
 use crate::rover::suspension::{Stand, WHEEL_RADIUS_M, WHEELS_M};
 use crate::scenario::{Course, DriveSettings, RoverSettings};
 
-/// How far the ground reaches behind the first stop and to either side, m, at least.
+/// Smallest extent of the ground behind the first stop and to either side, m.
 const AROUND_START_M: [f64; 2] = [2.5, 7.0];
-/// How far the ground reaches behind the targets' centre, seen from any stop, m.
+/// Extent of the ground behind the targets' centre, seen from any stop, m.
 const BEHIND_GOAL_M: f64 = 9.0;
-/// How far the ground reaches around the rover at any stop, m.
+/// Extent of the ground around the rover at any stop, m.
 const AROUND_ROVER_M: f64 = 2.0;
 
-/// Where the targets' centre lies in the plane, site frame, m: such that the first stop is near the origin.
+/// Horizontal position of the targets' centre, site frame, m: such that the first stop is near the origin.
 pub(crate) fn goal_m(drive: &DriveSettings) -> [f64; 2] {
     let level_m = drive.start_distance_m + 0.3;
     let (sine, cosine) = (drive.heading_deg + drive.start_bearing_deg).to_radians().sin_cos();
     [level_m * cosine, level_m * sine]
 }
 
-/// The course on flat ground without slip; fails where it is impossible even there.
+/// The course on flat ground without slip; fails if it is impossible even there.
 pub(crate) fn planned(drive: &DriveSettings) -> Result<TrueDrive> {
     let [x_m, y_m] = goal_m(drive);
     course::drive(&Scene {
@@ -46,7 +46,7 @@ pub(crate) fn planned(drive: &DriveSettings) -> Result<TrueDrive> {
     })
 }
 
-/// How far along x the front wheels get, with a margin, site frame, m.
+/// Largest x of the front wheels, with a margin, site frame, m.
 pub(crate) fn wheels_reach_m(drive: &DriveSettings) -> f64 {
     let front_m = WHEELS_M[0][0] + WHEEL_RADIUS_M + 0.1;
     if drive.course == Course::Approach && drive.heading_deg == 0.0 {
@@ -62,10 +62,10 @@ pub(crate) fn wheels_reach_m(drive: &DriveSettings) -> f64 {
     stands.map(farthest).fold(front_m, f64::max) + WHEEL_RADIUS_M + 0.1
 }
 
-/// The rectangle of ground that the drive needs: from and to along x, and along y, site frame, m.
+/// The rectangle of ground that the drive needs, site frame, m: lower and upper limit along x, then along y.
 ///
-/// It holds every stop of the plan and what its cameras see behind the targets' centre; that of a straight
-/// approach along x reaches 2.5 m behind the first stop, 9 m behind the centre and 7 m to either side.
+/// It contains every stop of the plan and the ground that its cameras see behind the targets' centre; for a straight
+/// approach along x it extends 2.5 m behind the first stop, 9 m behind the centre and 7 m to either side.
 pub(crate) fn ground_extent_m(drive: &DriveSettings) -> [[f64; 2]; 2] {
     let goal = goal_m(drive);
     let [behind_m, aside_m] = AROUND_START_M;

@@ -1,12 +1,12 @@
-//! Slip: how much of what the wheels advance the rover loses, by soil and slope.
+//! Slip: the part of the wheels' advance that the rover loses, by soil and slope.
 //!
 //! `slip = 1 − (true advance)/(wheel advance)`; 0 is none, 1 no progress, more than 1 sliding back. With α the
 //! slope of the ground under the rover, γ the grade along the motion (positive uphill) and s the table of
 //! domain.md 5.5 (interpolated between its angles, constant beyond the last):
 //!
 //! ```text
-//! along = s(0) + sign(γ) (s(|γ|) − s(0))          downhill the wheels hold back less than they roll
-//! aside = 0.6 s(α) sin χ                          downhill, as a part of the wheel advance
+//! along = s(0) + sign(γ) (s(|γ|) − s(0))          downhill the rover slides ahead of its wheels
+//! aside = 0.6 s(α) sin χ                          downhill, as a fraction of the wheel advance
 //! true  = u (1 − along) w + n aside w
 //! ```
 //!
@@ -28,21 +28,21 @@ use sightline_geometry::frames::Vector3;
 
 /// Slope angles of the table, degrees.
 const ANGLES_DEG: [f64; 6] = [0.0, 5.0, 10.0, 15.0, 20.0, 25.0];
-/// Part of the slip that shows across the motion where it runs along the hill.
+/// Fraction of the slip that acts sideways when the motion is along the contour of the hill.
 const ASIDE: f64 = 0.6;
-/// A rover that is to reach a place must keep this part of what its wheels advance.
+/// Smallest fraction of the wheel advance that must remain for the rover to reach a place.
 const LEAST_ADVANCE: f64 = 0.02;
 
-/// The slip of one motion, each as a part of the wheel advance.
+/// The slip of one motion, as fractions of the wheel advance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Slip {
-    /// Lost along the motion; negative where the rover slides ahead of its wheels.
+    /// Lost along the motion; negative if the rover slides ahead of its wheels.
     pub along: f64,
     /// Gained to the right of the motion.
     pub aside: f64,
 }
 
-/// The slip uphill on a slope, without unit (domain.md 5.5).
+/// The slip straight uphill on a slope, dimensionless (domain.md 5.5).
 pub(crate) fn of_slope(soil: Soil, slope_rad: f64) -> f64 {
     let table = match soil {
         Soil::LooseSand => [0.02, 0.08, 0.20, 0.45, 0.85, 1.10],
@@ -87,8 +87,8 @@ impl Slip {
         [x * along_m - y * aside_m, y * along_m + x * aside_m]
     }
 
-    /// The wheel advance (rover frame x and y, m) by which a rover truly moves `true_m` along a unit direction:
-    /// it steers against what slides aside. `None` where so much slips that it does not get there.
+    /// The wheel advance (rover frame x and y, m) for a true motion of `true_m` along a unit direction. Compensates
+    /// lateral slip. `None` if slip makes the motion unreachable.
     pub(crate) fn wheels_from_true(&self, direction: [f64; 2], true_m: f64) -> Option<[f64; 2]> {
         let kept = 1.0 - self.along;
         if kept < LEAST_ADVANCE {
@@ -135,7 +135,7 @@ mod tests {
         assert!((up.along - 0.45).abs() < 1e-9 && up.aside.abs() < 1e-12, "{up:?}");
         let down = on_slope(&sand(), &attitude, [-1.0, 0.0]);
         assert!((down.along - (0.02 - 0.43)).abs() < 1e-9, "{down:?}");
-        // Right side down by 15°: forward runs along the hill and slides to the right, backwards too.
+        // Right side down by 15°: forward follows the contour and slides to the right, backwards too.
         let attitude = attitude_from_roll_pitch_yaw(15f64.to_radians(), 0.0, -1.0);
         let along = on_slope(&sand(), &attitude, [1.0, 0.0]);
         assert!((along.aside - 0.27).abs() < 1e-9 && (along.along - 0.02).abs() < 1e-9, "{along:?}");

@@ -1,22 +1,22 @@
 //! The suspension: six wheels on rockers and bogies, settled on the ground and its rocks (`footing.rs`).
 //!
-//! **Mechanism.** On each side a rocker carries the front wheel and, behind, the pivot of a bogie with the
-//! middle and the rear wheel. The differential holds the body at the mean of the two rockers' pitch: the
-//! rockers' angles against the body are equal and opposite. All pivots turn about the body's y axis.
+//! **Mechanism.** On each side a rocker carries the front wheel and, behind, the pivot of a bogie with the middle and the
+//! rear wheel. The differential keeps the body at the mean of the two rockers' pitch: the rockers' angles against the body
+//! are equal and opposite. All pivots rotate about the body's y axis.
 //!
 //! ```text
 //! front  = P + Ry(ρ)(f − P)        bogie pivot B = P + Ry(ρ)(b − P)
 //! middle = B + Ry(ρ + β)(m − b)    rear          = B + Ry(ρ + β)(r − b)       ρ_left = −ρ_right
 //! ```
 //!
-//! **Contact.** A wheel is a thin disc in the plane of the body's forward and down axes. Its clearance is the
-//! least height of its underside over the ground:
-//! `c = min over θ of g(p_x, p_y) − p_z, p = axle + R (cos θ · down + sin θ · forward)`, the least of samples
-//! every two degrees, refined by golden section between that sample's neighbours. A disc bridges what
-//! is narrower than itself and meets a step before its axle does. Six clearances vanish for six unknowns:
-//! lift, roll, pitch, ρ, β_left, β_right. They are found by `u ← u − γ J⁻¹ c` with the lifts J of a level
-//! rover; γ = 1 at first, and less where the ground is so rough that full steps swing. The least clearances met are
-//! taken; where a wheel swings between two stones they may stay below 1 mm instead of vanishing.
+//! **Contact.** A wheel is a thin disc in the plane of the body's forward and down axes. Its clearance is the minimum
+//! height of its underside over the ground:
+//! `c = min over θ of g(p_x, p_y) − p_z, p = axle + R (cos θ · down + sin θ · forward)`, the minimum of samples every two
+//! degrees, refined by golden section between that sample's neighbours. A disc bridges gaps narrower than itself and meets
+//! a step before its axle does. Six clearances vanish for six unknowns: lift, roll, pitch, ρ, β_left, β_right. They are
+//! found by `u ← u − γ J⁻¹ c` with the lifts J of a level rover; γ = 1 at first, and less if full steps oscillate on rough
+//! ground. The unknowns with the smallest clearances are returned; if a wheel oscillates between two stones, these may be
+//! up to 1 mm instead of 0.
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
@@ -36,35 +36,34 @@ use sightline_geometry::frames::{Point3, Pose, Vector3, attitude_from_roll_pitch
 
 /// Radius of a wheel, m (domain.md 5.4).
 pub(crate) const WHEEL_RADIUS_M: f64 = 0.13;
-/// Width of a wheel, m (ours; only its body and its track have it, the contact is that of a thin disc).
+/// Width of a wheel, m (ours; used for body and tracks only, the contact is that of a thin disc).
 pub(crate) const WHEEL_WIDTH_M: f64 = 0.16;
-/// Where the wheels stand in the rover frame (x, y), m: front, middle, rear, each left and right
-/// (domain.md 5.4).
+/// Positions of the wheels in the rover frame (x, y), m: front, middle, rear, each left and right (domain.md 5.4).
 pub(crate) const WHEELS_M: [[f64; 2]; 6] =
     [[0.70, -0.53], [0.70, 0.53], [0.0, -0.60], [0.0, 0.60], [-0.70, -0.53], [-0.70, 0.53]];
 /// Height of the axles in the rover frame on flat ground, m.
 pub(crate) const AXLE_Z_M: f64 = MEAN_GROUND_Z_M - WHEEL_RADIUS_M;
 /// The pivot of a rocker (x, z) in the rover frame, m.
 pub(crate) const ROCKER_PIVOT_M: [f64; 2] = [0.0, 0.0];
-/// The pivot of a bogie (x, z) in the rover frame, the suspension being level, m.
+/// The pivot of a bogie (x, z) in the rover frame with the suspension level, m.
 pub(crate) const BOGIE_PIVOT_M: [f64; 2] = [-0.35, 0.10];
 
-/// How far from the body's down axis the underside is sampled to either side, in steps of two degrees.
+/// Samples of the underside to either side of the body's down axis, in steps of two degrees.
 const UNDERSIDE_STEPS: i32 = 40;
-/// A step of the underside's sampling, rad.
+/// Sampling step of the underside, rad.
 const UNDERSIDE_STEP_RAD: f64 = std::f64::consts::PI / 90.0;
-/// Narrowings of the contact's angle: two steps shrink to 1e-7 rad, and its height to rounding.
+/// Iterations of the golden section: two sampling steps shrink to 1e-7 rad, the height to rounding.
 const NARROWINGS: usize = 28;
-/// Part of an interval that a golden section keeps.
+/// Fraction of an interval that a golden section keeps.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
-/// A stand is found when no wheel is farther than this off the ground, m.
+/// The suspension is settled when no wheel is farther than this off the ground, m.
 const SETTLED_M: f64 = 1e-12;
-/// Where a wheel swings between two contacts for ever, the nearest that it comes is taken if no wheel is farther off
-/// than this, m: what may hide between two samples of an underside, a stone's edge included.
+/// If a wheel oscillates between two contacts, the best iterate is accepted if no wheel is farther off the ground than
+/// this, m: the height of a stone's edge that may hide between two samples of an underside.
 const SWINGING_M: f64 = 1e-3;
-/// Corrections before the search is given up.
+/// Largest number of corrections.
 const MOST_STEPS: usize = 300;
-/// γ from some correction on: less where a wheel swings between two contacts, as beside stones on a slope.
+/// γ from a given correction on: reduced if a wheel oscillates between two contacts, as beside stones on a slope.
 const PARTS: [(usize, f64); 3] = [(0, 1.0), (40, 0.4), (140, 0.15)];
 
 /// The angles of the suspension's joints, left and right, rad; positive lifts the front of the arm.
@@ -76,14 +75,14 @@ pub struct SuspensionAngles {
     pub bogie_rad: [f64; 2],
 }
 
-/// The rover standing on the ground.
+/// The rover settled on the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stand {
-    /// The rover in the site frame.
+    /// Pose of the rover.
     pub site_from_rover: Pose,
     /// The angles of the suspension.
     pub angles: SuspensionAngles,
-    /// Where the wheels touch the ground, site frame, m, in the order of [`WHEELS_M`].
+    /// Contact points of the wheels with the ground, site frame, m, in the order of [`WHEELS_M`].
     pub contacts_in_site: [Point3; 6],
 }
 
@@ -107,13 +106,13 @@ pub(crate) fn axles_in_rover(angles: &SuspensionAngles) -> [Point3; 6] {
 /// The unknowns of the search: lift, m; roll, pitch, left rocker, left and right bogie, rad.
 type Unknowns = Vector6<f64>;
 
-/// How much each unknown lifts each wheel of a level rover, m or m/rad.
+/// Lift of each wheel of a level rover per unit of each unknown, m/m or m/rad.
 fn lifts() -> Matrix6<f64> {
     Matrix6::from_fn(|wheel, unknown| {
         let [x, y] = WHEELS_M[wheel];
         let is_left = wheel % 2 == 0;
         let is_front = wheel < 2;
-        // A bogie's angle counts from its rocker, so the rocker turns all wheels of its side.
+        // A bogie's angle is relative to its rocker, so the rocker rotates all wheels of its side.
         let arm_m = x - ROCKER_PIVOT_M[0];
         match unknown {
             0 => 1.0,
@@ -136,7 +135,7 @@ fn angles_of(unknowns: &Unknowns) -> SuspensionAngles {
     SuspensionAngles { rocker_rad: [unknowns[3], -unknowns[3]], bogie_rad: [unknowns[4], unknowns[5]] }
 }
 
-/// The clearance of a wheel, m, and the point of its underside that has it, site frame.
+/// The clearance of a wheel, m, and the point of its underside with this clearance, site frame.
 fn contact(
     ground_z_m: &dyn Fn(f64, f64) -> f64,
     site_from_rover: &Pose,
@@ -180,10 +179,10 @@ fn contact(
     best
 }
 
-/// The rover settled with its frame's origin above x, y (site frame, m) and heading `yaw_rad`.
+/// Settles the rover with its frame's origin above x, y (site frame, m) and heading `yaw_rad`.
 ///
-/// `ground_z_m` gives the height of the ground at a place of the site frame, m down. `None` where no stand is
-/// found: on ground whose steps are higher than a wheel can lie against.
+/// `ground_z_m` returns z of the ground at a point of the site frame, m, positive down. `None` if the suspension does not
+/// settle: on ground with steps higher than a wheel can rest against.
 pub(crate) fn settle(
     ground_z_m: &dyn Fn(f64, f64) -> f64,
     x_m: f64,
@@ -253,7 +252,7 @@ mod tests {
 
     #[test]
     fn a_rock_under_one_front_wheel_gives_the_angles_of_the_levers() {
-        // A ball's cap 1 mm high under the left front wheel, which rolls over its top. To first order:
+        // A spherical cap 1 mm high under the left front wheel, which rolls over its top. To first order:
         // left rocker p_l = h/1.05 + φ/30, right rocker p_r = −φ/30, φ = h/3.32, pitch = (p_l + p_r)/2.
         let (h, radius_m) = (1e-3, 0.4);
         let rock = |x: f64, y: f64| {
@@ -267,7 +266,7 @@ mod tests {
         let rocker = h / 2.1 + roll / 30.0;
         assert!((stand.angles.rocker_rad[0] / rocker - 1.0).abs() < 5e-3);
         assert_eq!(stand.angles.rocker_rad[0], -stand.angles.rocker_rad[1]);
-        // The bogies stay on the level ground, but for the roll: −φ/10 and +φ/10 from it.
+        // The bogies stay on the level ground, except for the roll: −φ/10 and +φ/10 from it.
         let bogies = [-0.1 * roll - h / 1.05 - roll / 30.0, 0.1 * roll + roll / 30.0];
         for (bogie, expected) in stand.angles.bogie_rad.iter().zip(bogies) {
             assert!((bogie - expected).abs() < 5e-3 * h, "{bogie} {expected}");
@@ -278,7 +277,7 @@ mod tests {
     fn front_wheels_on_a_ledge_pitch_the_rockers_alone() {
         let h = 0.20;
         let stand = settle(&|x, _| if x > 0.35 { -h } else { 0.0 }, 0.0, 0.0, 0.0).unwrap();
-        // The bogies are level, so their pivots lie 0.194 m above the ground; the front axles 0.13 m + h.
+        // The bogies are level, so their pivots are 0.194 m above the ground; the front axles 0.13 m + h.
         let arm = (1.05f64, AXLE_Z_M - BOGIE_PIVOT_M[1]);
         let radius_m = arm.0.hypot(arm.1);
         let pitch = arm.1.atan2(arm.0) - ((arm.1 - h) / radius_m).asin();
@@ -316,12 +315,12 @@ mod tests {
 
     #[test]
     fn a_wheel_meets_a_step_before_its_axle_does() {
-        // The edge of a 5 cm step lies 6 cm ahead of the axles of the front wheels of a level rover.
+        // The edge of a 5 cm step is 6 cm ahead of the axles of the front wheels of a level rover.
         let step = |x: f64, _: f64| if x > 0.76 { -0.05 } else { 0.0 };
         let stand = settle(&step, 0.0, 0.0, 0.0).unwrap();
         let axle = stand.site_from_rover * axles_in_rover(&stand.angles)[0];
         let to_edge = (0.76 - axle.x).hypot(-0.05 - axle.z);
-        // The disc leans on the edge.
+        // The disc rests against the edge.
         assert!((to_edge - 0.13).abs() < 1e-6, "{to_edge}");
         assert!(-axle.z > 0.14, "{}", axle.z);
     }

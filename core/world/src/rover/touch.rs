@@ -1,4 +1,4 @@
-//! Rocks that reach into the rover's body where it stands: one of the two kinds of collision.
+//! Rocks inside the rover's body at its pose: one of the two kinds of collision.
 //!
 //! Frame: rocks in the site, the body in the rover frame, m.
 
@@ -8,7 +8,7 @@ use crate::rover::body::parts;
 use crate::rover::suspension::Stand;
 use crate::world::World;
 
-/// How many rocks reach into the body of a standing rover, its wheels and arms left out.
+/// Number of rocks that extend into the body of a settled rover, wheels and arms excluded.
 pub(crate) fn touched_rocks(world: &World, stand: &Stand) -> u32 {
     let boxes = parts(&stand.angles);
     let is_inside = |point: Point3| {

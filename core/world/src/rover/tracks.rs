@@ -1,9 +1,8 @@
 //! The wheel tracks that a drive leaves on the ground.
 //!
-//! Each wheel draws one line: the places over which its axle passed, piece after piece of every leg (`course.rs`). (Where it
-//! touches hops from stone to stone; where it goes does not.) Where slip was staged the wheels turned on the spot, and the
-//! line stands still there. How wide and how deep the six lines are is with them, drawing them is the ground's part
-//! (`imprint.rs`).
+//! Each wheel leaves one line: the points under its axle, piece after piece of every leg (`course.rs`). (Contact points
+//! jump from stone to stone; axles do not.) Under forced slip the wheels turn on the spot, and the line does not advance.
+//! The lines have a width and a depth; `imprint.rs` renders them.
 //!
 //! Frame: site, m. Sources: papers.md R142; domain.md 5.4 (wheels).
 
@@ -17,11 +16,11 @@ use crate::traverse::WheelPlaces;
 pub(crate) struct Polyline {
     /// The wheel, in the order of `suspension::WHEELS_M`.
     pub wheel: usize,
-    /// x and y of the points of its middle line, in the order in which they were passed, site frame, m.
+    /// x and y of the points of its centre line, in driving order, site frame, m.
     pub points_in_site: Vec<[f64; 2]>,
-    /// Its width, m.
+    /// Width, m.
     pub width_m: f64,
-    /// How deep the wheel sank in, m.
+    /// Sinkage of the wheel, m.
     pub depth_m: f64,
 }
 
@@ -33,7 +32,7 @@ pub(crate) struct Tracks {
 }
 
 impl Tracks {
-    /// The tracks of a drive; none where the settings leave no tracks.
+    /// The tracks of a drive; empty if the settings leave no tracks.
     pub(crate) fn new(drive: &TrueDrive, settings: &RoverSettings) -> Self {
         if !settings.tracks {
             return Self { lines: Vec::new(), laid: vec![0; drive.stops.len()] };
@@ -43,7 +42,7 @@ impl Tracks {
         Self::through(&ways, settings)
     }
 
-    /// The tracks through the places that the wheels passed on the way to each stop, m.
+    /// The tracks through the wheel positions on the way to each stop, m.
     pub(crate) fn through(places_m: &[Vec<WheelPlaces>], settings: &RoverSettings) -> Self {
         let line = |wheel: usize| Polyline {
             wheel,
@@ -63,18 +62,18 @@ impl Tracks {
         &self.lines
     }
 
-    /// How many points of each line are laid when the rover stands at each stop; none at the first.
+    /// Number of points of each line that exist at each stop; 0 at the first.
     pub(crate) fn laid(&self) -> &[usize] {
         &self.laid
     }
 }
 
-/// The places that the wheels pass in a leg, m.
+/// The wheel positions of a leg, m.
 pub(crate) fn places_m(leg: &Leg) -> Vec<WheelPlaces> {
     leg.stands.iter().map(below_axles).collect()
 }
 
-/// The places below a rover's axles.
+/// The points below a rover's axles.
 fn below_axles(stand: &Stand) -> WheelPlaces {
     axles_in_rover(&stand.angles).map(|axle| {
         let place = stand.site_from_rover * axle;

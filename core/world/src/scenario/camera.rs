@@ -8,25 +8,25 @@ use crate::traverse::FURTHER_CAMERAS_LIMIT;
 use sightline_geometry::camera::{CameraName, MastAngles};
 use sightline_geometry::error::{Error, Result};
 
-/// The largest number of the 12-bit converter.
+/// Largest output of the 12-bit converter, DN.
 pub const FULL_SCALE_DN: f64 = 4095.0;
-/// Widths that images can have, px.
+/// Allowed image widths, px.
 const IMAGE_SIZES: [u32; 4] = [1024, 512, 256, 128];
 /// Full scale of the 8-bit converter's table, DN.
 const BYTE_DN: f64 = 255.0;
 
-/// A pair of cameras and where it sits; the models are in `sim/camera/rig.rs`.
+/// A pair of cameras and where it is mounted; the models are in `camera/rig.rs`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CameraRig {
     /// Spirit's navcams on the mast, 1024 × 1024 px, 46° (domain.md 4.3).
     #[default]
     MerNavcam,
-    /// Opportunity's pancams on the mast, 1024 × 1024 px, 16°; the right eye is ours (domain.md 4.3, 5.1).
+    /// Opportunity's pancams on the mast, 1024 × 1024 px, 16°; the right camera is ours (domain.md 4.3, 5.1).
     MerPancam,
-    /// Opportunity's front hazcams on the body, 1024 × 1024 px, 126°; the right eye is ours (domain.md 5.1).
+    /// Opportunity's front hazcams on the body, 1024 × 1024 px, 126°; the right camera is ours (domain.md 5.1).
     MerFrontHazcam,
-    /// Hazcams that look backwards: the front ones turned about the rover's z axis by 180° (ours).
+    /// Rear hazcams: the front ones rotated about the rover's z axis by 180° (ours).
     MerRearHazcam,
     /// Kim et al.'s example "Pancam" on the mast, 1024 × 768 px, f = 16 mm, baseline 0.30 m (R42).
     #[serde(rename = "table1_pancam")]
@@ -37,7 +37,7 @@ pub enum CameraRig {
 }
 
 impl CameraRig {
-    /// Whether the pair is fixed to the body, where nothing points it.
+    /// Whether the pair is fixed to the body and cannot be pointed.
     pub(crate) fn is_on_body(self) -> bool {
         matches!(self, Self::MerFrontHazcam | Self::MerRearHazcam)
     }
@@ -51,7 +51,8 @@ pub struct FurtherRig {
     pub name: CameraName,
     /// Which pair of cameras.
     pub rig: CameraRig,
-    /// Azimuth (to the right) and elevation (up), deg, to which the mast is turned for this pair; by default those of the main pair.
+    /// Azimuth (to the right) and elevation (up), deg, to which the mast is turned for this pair; by default those of
+    /// the main pair.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub look_deg: Option<[f64; 2]>,
     /// Width of its images, px: 1024, 512, 256 or 128.
@@ -60,7 +61,7 @@ pub struct FurtherRig {
 }
 
 impl FurtherRig {
-    /// The angles to which the mast is turned for this pair, if not those of the main pair.
+    /// Mast angles for this pair; `None` for those of the main pair.
     pub(crate) fn look(&self) -> Option<MastAngles> {
         let [azimuth_rad, elevation_rad] = self.look_deg?.map(f64::to_radians);
         Some(MastAngles { azimuth_rad, elevation_rad })
@@ -71,7 +72,7 @@ fn full_size() -> u32 {
     1024
 }
 
-/// How a recorded number comes from the 12-bit one.
+/// How the recorded number follows from the 12-bit one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Quantisation {
@@ -82,32 +83,32 @@ pub enum Quantisation {
     SquareRoot,
 }
 
-/// Who chooses the time of exposure.
+/// How the exposure time is chosen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ExposureMode {
-    /// One time for all pictures: the first left one has the mean `mean_level`.
+    /// One time for all images: the first left one has the mean `mean_level`.
     #[default]
     Fixed,
-    /// Automatic at each stop, from the whole left picture.
+    /// Automatic at each stop, from the whole left image.
     FullFrame,
-    /// Automatic at each stop, from a square around the centre of the left picture (R79).
+    /// Automatic at each stop, from a square around the centre of the left image (R79).
     Subframe,
 }
 
-/// The automatic exposure; names and values are those of real labels (domain.md 5.2).
+/// Automatic exposure; names and values are those of real image labels (domain.md 5.2).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct AutoExposureSettings {
-    /// The number that the brightest pixels are brought to, DN of 12 bits (2000: labels).
+    /// Target value of the brightest pixels, 12-bit DN (2000: labels).
     pub data_cut_dn: f64,
-    /// Part of the pixels that may lie above it, percent (1: labels).
+    /// Percentage of pixels that may exceed it (1: labels).
     pub pixel_fraction_percent: f64,
-    /// A change of the exposure smaller than this ends the search, percent (5: labels).
+    /// The search ends when the exposure changes by less than this, percent (5: labels).
     pub change_percent: f64,
-    /// Most exposures that are tried (6: labels).
+    /// Largest number of trial exposures (6: labels).
     pub iterations: u32,
-    /// Time of exposure before the first stop, s (0.43: between the 0.420 s and 0.445 s of real labels).
+    /// Exposure time before the first stop, s (0.43: between the 0.420 s and 0.445 s of real labels).
     pub start_s: f64,
     /// Side of the square of `subframe`, px of the image (161: domain.md 5.2).
     pub subframe_px: u32,
@@ -132,8 +133,8 @@ impl Default for AutoExposureSettings {
 pub struct CameraSettings {
     /// Which pair of cameras.
     pub rig: CameraRig,
-    /// A pair on the body to which the target is handed over: after the last stop the rover stays where it is and
-    /// this pair takes one more stop (none; `mer_front_hazcam`: Deans05 §3).
+    /// A pair on the body to which the target is handed off: after the last stop the rover stays where it is and this
+    /// pair takes one more stop (none; `mer_front_hazcam`: Deans05 §3).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hand_over: Option<CameraRig>,
     /// Width of the image, px: 1024, 512, 256 or 128; smaller ones are block averages (domain.md 2.1). The
@@ -143,38 +144,38 @@ pub struct CameraSettings {
     pub blur_px: f64,
     /// Samples along each axis of a pixel, 1 to 8; the pixel's value is their mean over its area.
     pub samples_per_axis: u32,
-    /// How much of the cos⁴ fall-off towards the corners is left, 0 to 1 (0: corrected on board).
+    /// Fraction of the cos⁴ fall-off towards the corners that remains, 0 to 1 (0: corrected on board).
     pub vignetting: f64,
-    /// What the correction of the flat field leaves, rms over the image, relative (0.025: domain.md 5.1).
+    /// Residue of the flat-field correction, rms over the image, relative (0.025: domain.md 5.1).
     pub flat_field_residue: f64,
-    /// Electrons per second of exposure and unit of radiance (600 000, ours: exposes the demonstration for
-    /// about as long as real labels say, 0.4 s). A white surface facing all the light has radiance 1.
+    /// Electrons per second of exposure and unit of radiance (600 000, ours: exposes the demonstration for about the
+    /// 0.4 s of real labels). A white surface that faces all the light has radiance 1.
     pub electrons_per_s: f64,
-    /// Electrons per second of exposure that come without light (0: negligible below −55 °C, domain.md 5.1).
+    /// Dark current, electrons per second of exposure (0: negligible below −55 °C, domain.md 5.1).
     pub dark_electrons_per_s: f64,
-    /// Time for which light falls in while the picture is moved to the storage, s (0: corrected on board;
-    /// 0.00512 where it is not, domain.md 11.3).
+    /// Time for which light falls in while the image is moved to the storage, s (0: corrected on board; 0.00512 where
+    /// it is not, domain.md 11.3).
     pub smear_s: f64,
-    /// Electrons that a pixel holds at most (200 000: domain.md 5.1).
+    /// Full-well capacity of a pixel, electrons (200 000: domain.md 5.1).
     pub full_well_electrons: f64,
-    /// Bits of a recorded pixel: 12, or 8.
+    /// Bits of a recorded pixel: 12 or 8.
     pub bit_depth: u32,
-    /// The way to 8 bits; with 12 bits only `linear` is possible.
+    /// Conversion to 8 bits; with 12 bits only `linear` is possible.
     pub quantisation: Quantisation,
-    /// Electrons per number of the 12-bit converter (42: 170 ke⁻ / 4095).
+    /// Electrons per DN of the 12-bit converter (42: 170 ke⁻ / 4095).
     pub gain_electrons_per_dn: f64,
     /// Read noise, electrons (30).
     pub read_noise_electrons: f64,
-    /// Number that the converter gives in the dark, DN of 12 bits (20).
+    /// Converter output in the dark, 12-bit DN (20).
     pub bias_dn: f64,
-    /// Pixel-to-pixel spread of the response, relative, fixed for each camera (0.01).
+    /// Pixel-to-pixel spread of the response, 1σ, relative, fixed for each camera (0.01).
     pub response_spread: f64,
-    /// Who chooses the time of exposure.
+    /// How the exposure time is chosen.
     pub exposure: ExposureMode,
     /// Mean of the first left image under `fixed` exposure, fraction of full scale (ours).
     pub mean_level: f64,
-    /// The seed of shot and read noise; that of the scenario where it is left out. The cameras' own response
-    /// follows the scenario's seed in any case.
+    /// Seed of shot and read noise; the scenario's seed if left out. The cameras' own response follows the scenario's
+    /// seed in any case.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_seed: Option<u64>,
     /// The automatic exposure.
@@ -214,7 +215,7 @@ impl Default for CameraSettings {
 }
 
 impl CameraSettings {
-    /// The number that full scale has in a recorded file, DN: 255 for 8 linear bits, else 4095.
+    /// Full scale of a recorded file, DN: 255 for 8 linear bits, else 4095.
     pub fn recorded_full_scale_dn(&self) -> f64 {
         match (self.bit_depth, self.quantisation) {
             (8, Quantisation::Linear) => BYTE_DN,
@@ -222,7 +223,7 @@ impl CameraSettings {
         }
     }
 
-    /// The same settings without those that the clean radiance does not depend on: these have their defaults.
+    /// These settings with those that do not affect the clean radiance reset to their defaults.
     pub fn of_radiance(&self) -> Self {
         Self {
             rig: self.rig,
@@ -301,7 +302,7 @@ impl CameraSettings {
 
 impl AutoExposureSettings {
     fn validate(&self) -> Result<()> {
-        // Above the largest bias, so that the cut is a light that can be reached.
+        // Above the largest bias, so that the cut corresponds to a positive radiance.
         within("camera.auto_exposure.data_cut_dn", self.data_cut_dn, 1001.0, 4000.0)?;
         within("camera.auto_exposure.pixel_fraction_percent", self.pixel_fraction_percent, 0.0, 50.0)?;
         within("camera.auto_exposure.change_percent", self.change_percent, 0.1, 50.0)?;

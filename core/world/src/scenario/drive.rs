@@ -1,4 +1,4 @@
-//! The way that the rover drives: a straight approach, or a list of moves.
+//! The drive: a straight approach, or a list of moves.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -7,13 +7,13 @@ use super::range::within;
 use crate::rover::approach::distances_m;
 use sightline_geometry::error::{Error, Result};
 
-/// The most stops that a list of moves may have: the index of a drive is read at every start of a server.
+/// Largest number of stops of a list of moves: a server reads the index of every drive when it starts.
 const STOP_LIMIT: usize = 2000;
 
-/// The farthest that a drive may begin from the targets' centre, m.
+/// Largest distance from the targets' centre at which a drive may begin, m.
 const FARTHEST_M: f64 = 50.0;
 
-/// What the drive is made of.
+/// How the drive is defined.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Course {
@@ -33,44 +33,44 @@ pub enum Move {
     Forward {
         /// How far the wheels advance, m; negative: backwards (−50 to 50).
         distance_m: f64,
-        /// Into how many equal steps it is divided, each with a stop at its end (1).
+        /// Number of equal steps, each with a stop at its end (1).
         #[serde(default = "one")]
         stops: u32,
     },
     /// Along a circle.
     Arc {
-        /// Radius of the circle that the middle of the rover follows, m; positive: its centre lies to the right
-        /// (0.2 to 1000, either sign).
+        /// Radius of the circle that the rover's origin follows, m; positive: its centre is to the right (0.2 to
+        /// 1000, either sign).
         radius_m: f64,
-        /// How far around the circle, deg; negative: backwards (−360 to 360).
+        /// Angle along the circle, deg; negative: backwards (−360 to 360).
         angle_deg: f64,
-        /// Into how many equal steps it is divided (1).
+        /// Number of equal steps (1).
         #[serde(default = "one")]
         stops: u32,
     },
-    /// On the spot.
+    /// A turn on the spot.
     Turn {
-        /// How far, deg, positive to the right (−360 to 360; Kim09 §5.4).
+        /// Angle, deg, positive to the right (−360 to 360; Kim09 §5.4).
         angle_deg: f64,
-        /// Into how many equal steps it is divided (1).
+        /// Number of equal steps (1).
         #[serde(default = "one")]
         stops: u32,
     },
-    /// Around the targets' centre on the circle of the present radius, always facing it (Kim09 §5.2).
+    /// Around the targets' centre on the circle of the current radius, always facing it (Kim09 §5.2).
     Crab {
-        /// How far around the centre, deg, positive clockwise seen from above (−360 to 360).
+        /// Angle around the centre, deg, positive clockwise seen from above (−360 to 360).
         angle_deg: f64,
-        /// Into how many equal steps it is divided (1).
+        /// Number of equal steps (1).
         #[serde(default = "one")]
         stops: u32,
     },
-    /// On the spot, until the targets' centre lies straight ahead.
+    /// A turn on the spot until the targets' centre is straight ahead.
     FaceTarget,
-    /// Towards the targets' centre, from where the rover stands along the straight line.
+    /// Towards the targets' centre along the straight line from the rover.
     Approach {
-        /// The last stop is the first one at this distance or nearer, m (1.8 to 50; less than the present one).
+        /// The last stop is the first one at this distance or nearer, m (1.8 to 50; less than the current one).
         to_distance_m: f64,
-        /// Part of the remaining distance that a step takes away (0.005 to 0.5).
+        /// Fraction of the remaining distance that a step covers (0.005 to 0.5).
         step_fraction: f64,
     },
 }
@@ -80,34 +80,34 @@ fn one() -> u32 {
     1
 }
 
-/// The way that the rover drives. Distances are those from the centre of the left camera, with the mast pointed
-/// to it, to the targets' centre.
+/// The drive. Distances are those from the centre of the left camera, with the mast pointed at it, to the targets'
+/// centre.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct DriveSettings {
-    /// What the drive is made of (`approach`).
+    /// How the drive is defined (`approach`).
     pub course: Course,
     /// Distance from the centre of the left camera to the targets' centre at the first stop, m (10: Kim09 §5.1).
     pub start_distance_m: f64,
     /// Course `approach`: the last stop is the first one at this distance or nearer, m (2: Kim09 §5.4).
     pub end_distance_m: f64,
-    /// Course `approach`: part of the remaining distance that a step takes away (0.10: Kim09 §5.4).
+    /// Course `approach`: fraction of the remaining distance that a step covers (0.10: Kim09 §5.4).
     pub step_fraction: f64,
-    /// Where the targets' centre lies as seen from the rover frame's origin at the first stop, deg, 0 ahead,
-    /// positive to the right (0; the course `approach` has no other).
+    /// Bearing of the targets' centre from the rover frame's origin at the first stop, deg, 0 ahead, positive to the
+    /// right (0; the course `approach` allows only 0).
     pub start_bearing_deg: f64,
-    /// Where the rover heads at the first stop, deg, 0 along x of the site, positive to the right (0).
+    /// Heading of the rover at the first stop, deg, 0 along x of the site, positive to the right (0).
     pub heading_deg: f64,
-    /// 1σ error of each mast angle, deg; the index gives the measured angles, its truth the real cameras
-    /// (0 by default; 0.05 is plausible: domain.md 4.5).
+    /// 1σ error of each mast angle, deg; the index contains the measured angles, its truth the true cameras (0 by
+    /// default; 0.05 is plausible: domain.md 4.5).
     pub pointing_error_deg: f64,
-    /// What the true azimuth and elevation of the mast exceed the measured ones by, deg, all along the drive:
-    /// an error of calibration (0, 0; raw angles of real masts are off by 0.2 and 3.6: domain.md 4.2).
+    /// Calibration error of the mast: true minus measured azimuth and elevation, deg, constant along the drive (0, 0;
+    /// raw angles of real masts are off by 0.2 and 3.6: domain.md 4.2).
     pub mast_offset_deg: [f64; 2],
-    /// Play of each mast axis, deg: the head follows only when the drive has moved beyond it
-    /// (0; domain.md 4.5 names no amount).
+    /// Backlash of each mast axis, deg: the head follows only after the drive has moved by more than this (0;
+    /// domain.md 4.5 gives no value).
     pub mast_backlash_deg: f64,
-    /// Course `moves`: the moves, in their order.
+    /// Course `moves`: the moves, in order.
     pub moves: Vec<Move>,
 }
 
@@ -129,7 +129,7 @@ impl Default for DriveSettings {
 }
 
 impl DriveSettings {
-    /// Refuses settings out of range; that the moves are possible one after the other is not checked here.
+    /// Rejects settings out of range. Does not check that the moves are possible in sequence.
     pub(crate) fn validate(&self) -> Result<()> {
         within("drive.heading_deg", self.heading_deg, -180.0, 180.0)?;
         within("drive.pointing_error_deg", self.pointing_error_deg, 0.0, 5.0)?;
@@ -172,7 +172,7 @@ impl DriveSettings {
 }
 
 impl Move {
-    /// The most stops with which it can end, wherever the rover begins it.
+    /// Largest number of stops that the move can make, wherever the rover begins it.
     fn most_stops(&self) -> usize {
         match *self {
             Self::Forward { stops, .. }
@@ -186,7 +186,7 @@ impl Move {
         }
     }
 
-    /// Refuses a move that is impossible wherever the rover stands; `index` is its place in the list.
+    /// Rejects a move that is impossible wherever the rover is; `index` is its position in the list.
     fn validate(&self, index: usize) -> Result<()> {
         let check = |field: &str, value: f64, low: f64, high: f64| {
             within(&format!("drive.moves[{index}].{field}"), value, low, high)

@@ -1,4 +1,4 @@
-//! What changes during a drive: the sun moves, clouds pass, something stands in the way, the rover casts its shadow.
+//! Events of a drive: the sun moves, clouds pass, objects occlude the target, the rover casts its shadow.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -8,39 +8,39 @@ use super::range::within;
 use sightline_geometry::camera::CameraName;
 use sightline_geometry::error::{Error, Result};
 
-/// What changes from stop to stop. By default nothing does.
+/// Changes from stop to stop; none by default.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct EventSettings {
-    /// How fast the sun's azimuth changes, degrees per hour of the drive (0; a sol on Mars: 14.6).
+    /// Rate of the sun's azimuth, degrees per hour of the drive (0; on Mars 14.6).
     pub sun_azimuth_deg_per_h: f64,
-    /// How fast the sun's elevation changes, degrees per hour of the drive (0).
+    /// Rate of the sun's elevation, degrees per hour of the drive (0).
     pub sun_elevation_deg_per_h: f64,
-    /// Whether the rover's body casts its shadow, and is seen where a camera looks down on it.
+    /// Whether the rover's body casts its shadow, and is visible to cameras that look down on it.
     pub rover_body: bool,
-    /// Clouds that pass the sun (Kim09 §5.5).
+    /// Clouds that pass in front of the sun (Kim09 §5.5).
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub clouds: Vec<Cloud>,
-    /// Things that stand between the cameras and the targets' centre (Kim09 §4.6, Kim09 §5.5, Deans05 §3).
+    /// Objects between the cameras and the targets' centre (Kim09 §4.6, Kim09 §5.5, Deans05 §3).
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub occluders: Vec<Occluder>,
     /// Reflections in the lenses of further pairs, in which stereo sees a surface that does not exist.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub ghosts: Vec<Ghost>,
-    /// Faults that a person injected into the drive.
+    /// Faults that the user injected into the drive.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub faults: Vec<Fault>,
 }
 
-/// A cloud before the sun, from one stop to another.
+/// A cloud in front of the sun, from one stop to another.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Cloud {
-    /// The first stop that it darkens.
+    /// First stop with the cloud.
     pub from_stop: u32,
-    /// The last stop that it darkens.
+    /// Last stop with the cloud.
     pub to_stop: u32,
-    /// What it leaves of the direct light, 0 to 1 (0.05: domain.md 11.1).
+    /// Transmitted fraction of the direct light, 0 to 1 (0.05: domain.md 11.1).
     #[serde(default = "opaque")]
     pub direct: f64,
 }
@@ -53,40 +53,40 @@ fn opaque() -> f64 {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Occluder {
-    /// The first stop at which it stands there.
+    /// First stop with the block.
     pub from_stop: u32,
-    /// The last stop at which it stands there.
+    /// Last stop with the block.
     pub to_stop: u32,
-    /// Where on the line of sight its middle lies: 0 at the camera, 1 at the targets' centre.
+    /// Position of its centre on the line of sight: 0 at the camera, 1 at the targets' centre.
     pub at: f64,
-    /// How wide it is, m.
+    /// Width, m.
     pub width_m: f64,
-    /// How high it is, m.
+    /// Height, m.
     pub height_m: f64,
-    /// How far its middle lies to the right of the line of sight, m.
+    /// Offset of its centre to the right of the line of sight, m.
     #[serde(default)]
     pub aside_m: f64,
 }
 
-/// A reflection in the lenses of a further pair, from one stop to another. Both images show it as they
-/// would show an upright blotched patch across the rover's path; it moves with the rover.
+/// A reflection in the lenses of a further pair, from one stop to another. Both images show it like an upright
+/// blotched patch across the rover's path; it moves with the rover.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 #[schema(as = LensGhost)]
 pub struct Ghost {
-    /// The pair, by its name in camera.further.
+    /// Name of the pair in `camera.further`.
     pub camera: CameraName,
-    /// The first stop at which it is seen.
+    /// First stop at which it is visible.
     pub from_stop: u32,
-    /// The last stop at which it is seen.
+    /// Last stop at which it is visible.
     pub to_stop: u32,
-    /// Its apparent middle: ahead of the rover's origin, to the right of it and below it, m.
+    /// Its apparent centre in the rover frame, m: ahead, to the right, below the origin.
     pub at_m: [f64; 3],
-    /// Its apparent width, m.
+    /// Apparent width, m.
     pub width_m: f64,
-    /// Its apparent height, m.
+    /// Apparent height, m.
     pub height_m: f64,
-    /// What its brightest blotches add to the mean radiance of the image, as a part of it (1).
+    /// Radiance that its brightest blotches add, as a fraction of the image's mean radiance (1).
     #[serde(default = "bright")]
     pub brightness: f64,
 }
@@ -96,12 +96,12 @@ fn bright() -> f64 {
 }
 
 impl EventSettings {
-    /// Whether a fault of a kind was injected at a stop.
+    /// Whether a fault of this kind is injected at a stop.
     pub fn has_fault(&self, kind: FaultKind, stop: u32) -> bool {
         self.faults.iter().any(|fault| fault.kind == kind && fault.covers(stop))
     }
 
-    /// Whether something stands in the way at some stop.
+    /// Whether there is an occluder at any stop.
     pub fn has_occluders(&self) -> bool {
         let is_occluder = |fault: &Fault| fault.kind == FaultKind::Occluder;
         !self.occluders.is_empty() || self.faults.iter().any(is_occluder)

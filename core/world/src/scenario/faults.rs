@@ -1,12 +1,12 @@
-//! Faults that a person injects into a drive to see how the executive copes with them (R208).
+//! Faults that the user injects into a drive to test how the executive handles them (R208).
 //!
-//! | fault | what it does at its stops |
+//! | fault | effect at its stops |
 //! |---|---|
-//! | `occluder` | a grey block of 0.6 m stands before the target, a third of the way from the camera |
-//! | `shadow` | the shadow of a block of 0.8 m that stands 2 m from the target towards the sun, out of the picture, lies on it |
-//! | `feature_starvation` | dust in the air takes 95 % of the contrast of every image |
+//! | `occluder` | a grey block of 0.6 m in front of the target, a third of the way from the camera to the target |
+//! | `shadow` | the shadow of a block of 0.8 m falls on the target, from an unseen block 2 m away towards the sun |
+//! | `feature_starvation` | dust in the air removes 95 % of the contrast of every image |
 //! | `pose_jump` | at the first of them the estimated heading jumps by 7° to the right |
-//! | `camera_drop_out` | the cameras on the mast give no images |
+//! | `camera_drop_out` | the cameras on the mast deliver no images |
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -15,19 +15,19 @@ use super::events::in_order;
 use super::range::within;
 use sightline_geometry::error::{Error, Result};
 
-/// What goes wrong.
+/// Kind of an injected fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FaultKind {
-    /// Something stands before the target.
+    /// An object occludes the target.
     Occluder,
     /// A shadow falls on the target.
     Shadow,
-    /// The images lose their contrast, and with it their features.
+    /// The images lose contrast, and with it their features.
     FeatureStarvation,
     /// The estimated heading jumps.
     PoseJump,
-    /// The main pair gives no images.
+    /// The main pair delivers no images.
     CameraDropOut,
 }
 
@@ -47,7 +47,7 @@ impl FaultKind {
         }
     }
 
-    /// Whether it concerns one target, whose position it needs.
+    /// Whether it affects one target, whose position it needs.
     pub const fn is_of_target(self) -> bool {
         matches!(self, Self::Occluder | Self::Shadow)
     }
@@ -58,24 +58,24 @@ impl FaultKind {
 #[serde(deny_unknown_fields)]
 #[schema(as = InjectedFault)]
 pub struct Fault {
-    /// What goes wrong.
+    /// Kind of the fault.
     pub kind: FaultKind,
-    /// The first stop at which it does.
+    /// First stop with the fault.
     pub from_stop: u32,
-    /// The last stop at which it does.
+    /// Last stop with the fault.
     pub to_stop: u32,
-    /// The position of the target that it concerns, site frame, m; left out: the targets' centre.
+    /// Position of the target, site frame, m; the targets' centre if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub target_m: Option<[f64; 3]>,
 }
 
 impl Fault {
-    /// Whether it is there at a stop.
+    /// Whether the fault is active at a stop.
     pub(crate) fn covers(&self, stop: u32) -> bool {
         (self.from_stop..=self.to_stop).contains(&stop)
     }
 
-    /// Refuses stops in the wrong order and positions out of range.
+    /// Rejects stops in the wrong order and positions out of range.
     pub(super) fn validate(&self, index: usize) -> Result<()> {
         let key = |field: &str| format!("events.faults[{index}].{field}");
         in_order(&key("to_stop"), self.from_stop, self.to_stop)?;

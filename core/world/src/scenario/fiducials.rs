@@ -1,4 +1,4 @@
-//! Marks of known shape that stand in the scene: aids for people and tests, which no tracker knows of (R181).
+//! Fiducials: objects of known shape in the scene, for people and tests; trackers do not use them (R181).
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -6,22 +6,22 @@ use utoipa::ToSchema;
 use super::range::within;
 use sightline_geometry::error::Result;
 
-/// A mark of known shape.
+/// An object of known shape.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Fiducial {
     /// A flat board of bright and dark squares, 1 cm thick, facing the first stop when `yaw_deg` is 0.
     Checkerboard {
-        /// Where its middle stands: ahead of the targets' centre, m.
+        /// x of its centre, m ahead of the targets' centre.
         x_m: f64,
-        /// Where its middle stands: right of the targets' centre, m.
+        /// y of its centre, m to the right of the targets' centre.
         y_m: f64,
-        /// Height of its middle above the mean ground, m.
+        /// Height of its centre above the mean ground, m.
         height_m: f64,
-        /// Turn about the vertical, degrees clockwise from above.
+        /// Rotation about the vertical, degrees clockwise from above.
         #[serde(default)]
         yaw_deg: f64,
-        /// How far it leans back, degrees: 90 is a board that lies on the ground and faces up.
+        /// Tilt backwards, degrees: at 90 the board is flat on the ground and faces up.
         #[serde(default)]
         tilt_deg: f64,
         /// Side of a square, m.
@@ -33,13 +33,13 @@ pub enum Fiducial {
     },
     /// A white ball.
     Sphere {
-        /// Where its middle stands: ahead of the targets' centre, m.
+        /// x of its centre, m ahead of the targets' centre.
         x_m: f64,
-        /// Where its middle stands: right of the targets' centre, m.
+        /// y of its centre, m to the right of the targets' centre.
         y_m: f64,
-        /// Height of its middle above the mean ground, m.
+        /// Height of its centre above the mean ground, m.
         height_m: f64,
-        /// Its radius, m.
+        /// Radius, m.
         radius_m: f64,
     },
 }

@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 use super::range::within;
 use sightline_geometry::error::{Error, Result};
 
-/// The most rocks that may be placed one by one.
+/// Largest number of individually placed rocks.
 const PLACED_LIMIT: usize = 1000;
 
 /// The relief of the ground: a fractal height field on a regular grid, a plane beyond it, and level ground far away.
@@ -15,7 +15,7 @@ const PLACED_LIMIT: usize = 1000;
 pub struct TerrainSettings {
     /// Side of a cell of the height field, m (0.01 to 0.10; ours).
     pub cell_m: f64,
-    /// RMS difference of height between two places 1 m apart, m (0.02: domain.md 10.4).
+    /// RMS height difference between points 1 m apart, m (0.02: domain.md 10.4).
     pub rms_at_1m_m: f64,
     /// Hurst exponent: the RMS difference grows as distance to this power (0.8: domain.md 10.4).
     pub hurst: f64,
@@ -25,12 +25,12 @@ pub struct TerrainSettings {
     pub slope_deg: f64,
     /// Direction of steepest ascent, deg clockwise from above: 0 ahead, 90 to the right, 180 behind.
     pub slope_azimuth_deg: f64,
-    /// How far from the first stop the slope reaches, m; beyond, the ground returns to the level of the planet, so that the
-    /// horizon is level (60, ours: outside of what surrounds a target at 10 m).
+    /// Distance from the first stop to the end of the slope, m; beyond it the ground returns to the mean level, so
+    /// that the horizon is level (60, ours: beyond the surroundings of a target at 10 m).
     pub slope_reach_m: f64,
-    /// Height of ripples of sand from trough to crest, m; 0 = none (ours; on Meridiani 0.01 to 0.05).
+    /// Height of sand ripples from trough to crest, m; 0 = none (ours; on Meridiani 0.01 to 0.05).
     pub ripple_height_m: f64,
-    /// Mean distance of their crests, m (ours).
+    /// Mean spacing of the ripple crests, m (ours).
     pub ripple_wavelength_m: f64,
     /// Direction across the crests, deg clockwise from above, 0 ahead.
     pub ripple_azimuth_deg: f64,
@@ -53,13 +53,13 @@ impl Default for TerrainSettings {
     }
 }
 
-/// The kinds of rocks (`sim/ground/shape.rs`).
+/// The kinds of rocks (`ground/shape.rs`).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RockShape {
     /// Broken rock with facets of all directions.
     Angular,
-    /// A box with chamfered edges; placed, it turns a flat face to where it looks.
+    /// A box with chamfered edges; a placed one has a flat face in the direction `yaw_deg`.
     #[default]
     Block,
     /// A low block with a flat top.
@@ -68,22 +68,22 @@ pub enum RockShape {
     Cobble,
 }
 
-/// A rock that stands where the scenario puts it.
+/// A rock at a position that the scenario gives.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlacedRock {
-    /// Place relative to the targets' centre, m ahead.
+    /// Position relative to the targets' centre, m ahead.
     pub x_m: f64,
-    /// Place relative to the targets' centre, m to the right.
+    /// Position relative to the targets' centre, m to the right.
     pub y_m: f64,
-    /// Width across the direction in which it looks, m.
+    /// Width across the direction that its face points in, m.
     pub diameter_m: f64,
     /// Height above the ground, m.
     pub height_m: f64,
-    /// Where its face looks, deg clockwise from above: 0 ahead, 180 towards the rover.
+    /// Direction that its face points in, deg clockwise from above: 0 ahead, 180 towards the rover.
     #[serde(default = "towards_the_rover_deg")]
     pub yaw_deg: f64,
-    /// Its kind.
+    /// Kind of rock.
     #[serde(default)]
     pub shape: RockShape,
 }
@@ -92,7 +92,7 @@ fn towards_the_rover_deg() -> f64 {
     180.0
 }
 
-/// A strip without high rocks from the first stop to a place near the targets' centre, for drives on commands.
+/// A strip without high rocks from the first stop to a point near the targets' centre, for commanded drives.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ClearPath {
@@ -100,7 +100,7 @@ pub struct ClearPath {
     pub to_x_m: f64,
     /// The same along y of the site, m (0).
     pub to_y_m: f64,
-    /// Half of the strip's width, m (1.2: half of the wheels' track, and room for arcs and for a moving goal; ours).
+    /// Half of the strip's width, m (1.2: half of the wheel track, and room for arcs and for a moving goal; ours).
     pub half_width_m: f64,
     /// Height of the highest rock that remains in the strip, m (0.10: Kim09 §6).
     pub above_m: f64,
@@ -121,35 +121,38 @@ impl ClearPath {
     }
 }
 
-/// Rocks by the size distribution of Golombek & Rapp, a cluster near the targets' centre, and single ones.
+/// Rocks by the size distribution of Golombek & Rapp, a cluster near the targets' centre, and individually placed
+/// ones.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RockSettings {
     /// Fraction k of the area that rocks cover (0.09; Spirit's plain 0.05, Pathfinder 0.19: domain.md 10.2).
     pub area_fraction: f64,
-    /// The smallest rock near the approach, m of diameter; grows with distance from it. A pixel spans 1.6 mm at 2 m
-    /// and 8 mm at 10 m (ours: a pebble of 2 cm).
+    /// Diameter of the smallest rock near the approach, m; it grows with the distance from it. A pixel spans 1.6 mm
+    /// at 2 m and 8 mm at 10 m (ours: a pebble of 2 cm).
     pub smallest_m: f64,
-    /// The largest rock, m of diameter (ours: a boulder).
+    /// Diameter of the largest rock, m (ours: a boulder).
     pub largest_m: f64,
-    /// How far rocks are scattered ahead of the first stop, m (ours).
+    /// Distance ahead of the first stop up to which rocks are scattered, m (ours).
     pub farthest_m: f64,
-    /// Mean height above ground over diameter, for large rocks (0.5: domain.md 10.3, Viking 2; Viking 1 0.365).
+    /// Mean ratio of height above ground to diameter, for large rocks (0.5: domain.md 10.3, Viking 2; Viking 1
+    /// 0.365).
     pub height_ratio: f64,
-    /// What every rock is higher than that on average, m (0.008: domain.md 10.3).
+    /// Constant added to every rock's mean height, m (0.008: domain.md 10.3).
     pub height_offset_m: f64,
-    /// Rocks of the cluster around the targets' centre (ours).
+    /// Number of rocks in the cluster around the targets' centre (ours).
     pub cluster_count: u32,
     /// Radius of the cluster, m (ours).
     pub cluster_radius_m: f64,
-    /// The smallest rock of the cluster, m of diameter (ours).
+    /// Diameter of the smallest rock of the cluster, m (ours).
     pub cluster_smallest_m: f64,
-    /// The largest rock of the cluster, m of diameter (ours: a rock worth driving to).
+    /// Diameter of the largest rock of the cluster, m (ours: a rock worth driving to).
     pub cluster_largest_m: f64,
-    /// Rocks that stand where the scenario puts them; scattered rocks give way to them.
+    /// Rocks at given positions; scattered rocks that overlap them are left out.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub placed: Vec<PlacedRock>,
-    /// Whether scattered rocks keep off the wheels' lines of the planned drive (true). With false they do not depend on the drive.
+    /// Whether scattered rocks avoid the wheel paths of the planned drive (true). If false, they do not depend on the
+    /// drive.
     #[serde(skip_serializing_if = "is_true")]
     pub off_planned_drive: bool,
     /// A strip from which scattered rocks are removed (none); placed rocks remain.
@@ -186,28 +189,28 @@ impl Default for RockSettings {
 /// Albedo and micro-relief.
 ///
 /// Contrast on Mars is low: in windows of 21 × 21 px, standard deviation over mean has the median 0.04 to 0.05 in
-/// Opportunity's navcam frames of sol 4087 and 0.045 to 0.085 in Spirit's of sols 1869 and 1907; power falls as f^−1.7 to
-/// f^−2.8 (`experiments/src/picture.rs`). The defaults put pictures of soil among them.
+/// Opportunity's navcam images of sol 4087 and 0.045 to 0.085 in Spirit's of sols 1869 and 1907; power falls as
+/// f^−1.7 to f^−2.8 (`experiments/src/picture.rs`). With the defaults, images of soil are in these ranges.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TextureSettings {
-    /// Mean albedo of the soil, without unit.
+    /// Mean albedo of the soil.
     pub soil_albedo: f64,
-    /// Mean albedo of the rocks, without unit; each rock differs by 15 % (1σ).
+    /// Mean albedo of the rocks; individual rocks differ by 15 % (1σ).
     pub rock_albedo: f64,
     /// Standard deviation of the albedo within one surface, relative, all octaves together.
     pub albedo_std: f64,
-    /// β of the albedo's power spectrum f^−β in two dimensions (2.1: as much contrast in every octave; ours).
+    /// β of the albedo's power spectrum f^−β in two dimensions (2.1: about equal contrast in every octave; ours).
     pub spectrum_slope: f64,
-    /// The part of the soil that grains of 2 to 18 mm cover, 0 to 0.4 (ours).
+    /// Fraction of the soil covered by grains of 2 to 18 mm, 0 to 0.4 (ours).
     pub grain_cover: f64,
-    /// The part of the soil that smooth drifts of dust cover, 0 to 0.9 (ours).
+    /// Fraction of the soil covered by smooth drifts of dust, 0 to 0.9 (ours).
     pub drift_cover: f64,
     /// Standard deviation of one component of the soil's micro-slope, m/m, all octaves together.
     pub soil_slope_std: f64,
     /// The same for rocks.
     pub rock_slope_std: f64,
-    /// How much of the soil's albedo lies as dust on a rock's face that looks straight up, 0 to 1.
+    /// Dust cover of an upward-facing rock face, as a fraction of the soil's albedo, 0 to 1.
     pub dust: f64,
     /// The longest wavelength of the texture, m.
     pub longest_m: f64,
@@ -243,7 +246,7 @@ impl TerrainSettings {
         within("terrain.slope_azimuth_deg", self.slope_azimuth_deg, -360.0, 360.0)?;
         within("terrain.slope_reach_m", self.slope_reach_m, 30.0, 10_000.0)?;
         within("terrain.ripple_height_m", self.ripple_height_m, 0.0, 0.3)?;
-        // A crest needs eight vertices, or the grid would shape it.
+        // A crest needs eight vertices; otherwise the grid would determine its shape.
         let least_m = if self.ripple_height_m > 0.0 { 8.0 * self.cell_m } else { 0.01 };
         within("terrain.ripple_wavelength_m", self.ripple_wavelength_m, least_m, 20.0)?;
         within("terrain.ripple_azimuth_deg", self.ripple_azimuth_deg, -360.0, 360.0)

@@ -1,4 +1,4 @@
-//! The light: the sun, with hard shadows, the sky, and the law by which surfaces reflect them.
+//! The light: the sun, with hard shadows, the sky, and the law of reflection.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -6,14 +6,14 @@ use utoipa::ToSchema;
 use super::range::within;
 use sightline_geometry::error::Result;
 
-/// The law by which surfaces reflect the sun's light (domain.md 11.2).
+/// The law of reflection for the sun's light (domain.md 11.2).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Reflectance {
     /// A mixture of Lommel–Seeliger's and Lambert's laws.
     #[default]
     LunarLambert,
-    /// Hapke's model with a two-lobe phase function: backscattering and bright opposite the sun.
+    /// Hapke's model with a two-lobe phase function: backscattering, brightest opposite the sun.
     Hapke,
 }
 
@@ -21,31 +21,31 @@ pub enum Reflectance {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SunSettings {
-    /// Where the sun stands, deg, clockwise from above, 0 straight ahead of the drive, 90 on the right.
+    /// Azimuth of the sun, deg, clockwise from above, 0 straight ahead of the drive, 90 on the right.
     pub azimuth_deg: f64,
-    /// Its height above the horizon, deg.
+    /// Elevation of the sun above the horizon, deg.
     pub elevation_deg: f64,
-    /// The sky's part of the light on level ground (0.45: optical depth 0.55, sun at 45°, domain.md 11.1; shadows in
-    /// Spirit's frames of sol 1869 keep half of the mean level).
+    /// Fraction of the light on level ground that comes from the sky (0.45: optical depth 0.55, sun at 45°, domain.md
+    /// 11.1; shadows in Spirit's images of sol 1869 have half of the mean level).
     pub diffuse_fraction: f64,
-    /// Optical depth of the dust in the air; when set, it gives the sky's part from the sun's height instead of
-    /// `diffuse_fraction` (0.3 to 0.5 in the clear season, 1 when dusty: domain.md 11.1).
+    /// Optical depth of the dust in the air; if set, it determines the sky's fraction from the sun's elevation
+    /// instead of `diffuse_fraction` (0.3 to 0.5 in the clear season, 1 when dusty: domain.md 11.1).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub optical_depth: Option<f64>,
-    /// How much brighter the sky is around the sun than far from it, less one (2: domain.md 11.1).
+    /// Ratio of the sky's radiance around the sun to that far from it, minus one (2: domain.md 11.1).
     pub aureole: f64,
-    /// The law by which surfaces reflect the sun.
+    /// The law of reflection for the sun's light.
     pub reflectance: Reflectance,
     /// L of the lunar–Lambert law, 0 = Lambert (0.5: domain.md 11.2).
     pub lunar_lambert: f64,
-    /// Mean slope of the roughness that is too fine to be drawn, deg (15: domain.md 11.2 gives 10 to 20): it keeps
-    /// grazing surfaces from shining.
+    /// Mean slope of the roughness below the resolution of the surface, deg (15: domain.md 11.2 gives 10 to 20): it
+    /// keeps grazing surfaces from shining.
     pub roughness_deg: f64,
-    /// b of Hapke's phase function: how narrow its two lobes are, 0 = even (0.35: domain.md 11.2).
+    /// b of Hapke's phase function: how narrow its two lobes are, 0 = isotropic (0.35: domain.md 11.2).
     pub hapke_lobe: f64,
-    /// c of Hapke's phase function: 1 = all light back to the sun, −1 = all forwards (0.5: domain.md 11.2).
+    /// c of Hapke's phase function: 1 = all backscattering, −1 = all forward scattering (0.5: domain.md 11.2).
     pub hapke_backscatter: f64,
-    /// B0 of Hapke's opposition surge: its height over the phase function (1: domain.md 11.2).
+    /// B0 of Hapke's opposition surge: its height relative to the phase function (1: domain.md 11.2).
     pub hapke_surge: f64,
     /// h of Hapke's opposition surge: tangent of half its width (0.05: domain.md 11.2).
     pub hapke_surge_width: f64,

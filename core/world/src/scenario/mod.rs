@@ -1,13 +1,12 @@
-//! The scenario: every number from which a simulated traverse follows, read from and written to TOML.
+//! The scenario: every parameter of a simulated traverse, read from and written to TOML.
 //!
-//! A field that is left out takes its default; a field that does not exist is refused by name. Two equal
-//! scenarios give the same bits. Defaults describe a Spirit-like rover on a plain with the rock abundance
-//! of Gusev's rockier places; none may be chosen by looking at a tracker's result.
+//! A field that is left out takes its default; an unknown field is rejected by name. Equal scenarios give the same
+//! bits. Defaults describe a Spirit-like rover on a plain with the rock abundance of Gusev's rockier places; none may
+//! be tuned on a tracker's results.
 //!
-//! Frames: the site frame is level (+z down), its x axis is the direction of the drive (unless
-//! `drive.heading_deg` and `drive.start_bearing_deg` turn it away), its origin lies on
-//! the mean ground below which the first stop's middle wheels stand, 0.294 m above the mean plane: where the
-//! rover frame of a rover on flat ground would be. Angles of the sun are measured in it (domain.md 1.5).
+//! Frames: the site frame is level (+z down). Its x axis is the direction of the drive, unless `drive.heading_deg` and
+//! `drive.start_bearing_deg` differ from 0. Its origin is near the rover's place at the first stop, 0.294 m above the mean
+//! plane, like the rover frame of a rover on flat ground. Angles of the sun are measured in it (domain.md 1.5).
 //! Sources: domain.md 2.1 (block average), 5.1 (detector), 5.5 (odometry), 10 (rocks, ground), 11 (light,
 //! sensor); papers.md R21 (window rule), R104–R106 (steps), R227 (seeds).
 
@@ -39,20 +38,20 @@ pub use light::{Reflectance, SunSettings};
 pub use rover::{ForcedSlip, HeadingJump, OdometryModel, RoverSettings, Soil};
 pub use targets::{Arrangement, TargetRule};
 
-/// Every number from which a simulated traverse follows.
+/// Every parameter of a simulated traverse.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Scenario {
-    /// A short name.
+    /// Short name.
     pub name: String,
-    /// What it stages, from which source, and what had to be assumed.
+    /// What the scenario stages, from which source, and the assumptions made.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub description: String,
-    /// The seed of everything random: relief, rocks, texture, pose errors, noise, choice of targets.
+    /// Seed of all random numbers: relief, rocks, texture, pose errors, noise, choice of targets.
     pub seed: u64,
     /// The relief of the ground.
     pub terrain: TerrainSettings,
-    /// How many rocks of which size.
+    /// Number and sizes of the rocks.
     pub rocks: RockSettings,
     /// Albedo and micro-relief of soil and rock.
     pub texture: TextureSettings,
@@ -60,13 +59,13 @@ pub struct Scenario {
     pub sun: SunSettings,
     /// The detector and the optics.
     pub camera: CameraSettings,
-    /// The way that the rover drives.
+    /// The drive.
     pub drive: DriveSettings,
-    /// The rover's wheels, its sense of place and its tracks.
+    /// The rover's wheels, odometry and tracks.
     pub rover: RoverSettings,
-    /// What changes during the drive.
+    /// Changes during the drive.
     pub events: EventSettings,
-    /// Marks of known shape.
+    /// Objects of known shape.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub fiducials: Vec<Fiducial>,
     /// 1σ errors of the pose estimate, step by step (default 1 % along, 0.5 % across, 0.1°: domain.md 5.5).
@@ -102,7 +101,7 @@ impl Scenario {
         Self { name: "straight approach, rocky plain".into(), ..Self::default() }
     }
 
-    /// The scenario as TOML, every field written.
+    /// The scenario as TOML with every field.
     pub fn to_toml(&self) -> String {
         toml::to_string_pretty(self).unwrap_or_default()
     }

@@ -2,10 +2,10 @@
 
 use sightline_geometry::error::{Error, Result};
 
-/// The largest seed that every reader of the file takes exactly (TOML has 63 bits, a browser 53).
+/// Largest seed that every reader of the file represents exactly (TOML has 63 bits, a browser 53).
 pub(crate) const MAX_SEED: u64 = 1 << 53;
 
-/// Refuses a value outside `[low, high]`, or one that is no number.
+/// Rejects a value outside `[low, high]`, or NaN.
 pub(crate) fn within(key: &str, value: f64, low: f64, high: f64) -> Result<()> {
     if value >= low && value <= high {
         return Ok(());

@@ -1,4 +1,4 @@
-//! The rover: how its wheels slip, what it knows of its way, and the tracks that it leaves.
+//! The rover: wheel slip, odometry, and the tracks that it leaves.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -6,81 +6,82 @@ use utoipa::ToSchema;
 use super::range::within;
 use sightline_geometry::error::Result;
 
-/// The soil that the wheels stand on (domain.md 5.5).
+/// The soil under the wheels (domain.md 5.5).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Soil {
-    /// Loose sand: 45 % of slip on 15°.
+    /// Loose sand: slip ratio 45 % on 15°.
     LooseSand,
-    /// Firm soil with rocks: 15 % of slip on 15°.
+    /// Firm soil with rocks: slip ratio 15 % on 15°.
     #[default]
     FirmSoil,
-    /// Bedrock: 3 % of slip on 15°.
+    /// Bedrock: slip ratio 3 % on 15°.
     Bedrock,
 }
 
-/// Where the pose estimate comes from.
+/// Source of the pose estimate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum OdometryModel {
-    /// The true motion with the errors that `odometry_error` states: exactly what the tracker assumes.
+    /// The true motion with the errors that `odometry_error` states: exactly the model that the tracker assumes.
     #[default]
     Stated,
-    /// What the wheels advance, laid out along an attitude from gyro and accelerometers: slip is an error (R10).
+    /// Wheel odometry integrated along an attitude from gyro and accelerometers: slip is an error (R10).
     WheelsAndImu,
 }
 
-/// A slip that is staged for the way to one stop.
+/// A given slip ratio on the motion to one stop.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ForcedSlip {
-    /// The number of the stop at which the motion ends; the first stop is 0, so 1 or more.
+    /// Index of the stop at which the motion ends; the first stop is 0, so 1 or more.
     pub stop: u32,
-    /// Part of the motion that is lost: 1 = the wheels turn and the rover stays (0 to 1.25: domain.md 5.5).
+    /// Slip ratio: 1 = the wheels turn and the rover stays (0 to 1.25: domain.md 5.5).
     pub slip: f64,
 }
 
-/// A jump of the estimated heading that is staged for the way to one stop: the attitude is set anew, for example by a
-/// sighting of the sun, and not to what it was.
+/// A jump of the estimated heading on the motion to one stop: the attitude is reset, for example by a sighting of the sun,
+/// to a wrong value.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HeadingJump {
-    /// The number of the stop from which on the estimate is turned; the first stop is 0, so 1 or more.
+    /// Index of the first stop with the rotated estimate; the first stop is 0, so 1 or more.
     pub stop: u32,
-    /// By how much, deg, positive to the right (−45 to 45).
+    /// Angle of the jump, deg, positive to the right (−45 to 45).
     pub yaw_deg: f64,
 }
 
-/// The rover's wheels and its sense of place.
+/// The rover's wheels and its odometry.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RoverSettings {
-    /// The soil that the wheels stand on (`firm_soil`, ours).
+    /// The soil under the wheels (`firm_soil`, ours).
     pub soil: Soil,
-    /// Factor on the slip of the soil: 1 takes domain.md 5.5 as it is, 0 means none (0, ours).
+    /// Factor on the slip of the soil: 1 = as in domain.md 5.5, 0 = none (0, ours).
     pub slip_scale: f64,
-    /// 1σ spread of the slip of a step as a part of it, drawn for each step of a drive on commands (0; 0.2 is plausible, ours).
+    /// 1σ spread of the slip of a step relative to it, drawn for each step of a commanded drive (0; 0.2 is plausible,
+    /// ours).
     #[serde(skip_serializing_if = "is_zero")]
     pub slip_spread: f64,
     /// Height of the highest rock that a wheel climbs, m; a higher one stalls it (0.25: domain.md 5.4).
     pub climb_m: f64,
-    /// From the way to this stop on nothing but the wheels turns: 100 % of slip; 0 means never (0; Kim09 §5.5).
+    /// From the motion to this stop on, the slip ratio is 100 % (the rover is stuck); 0 = never (0; Kim09 §5.5).
     pub stuck_from_stop: u32,
-    /// Where the pose estimate comes from (`stated`).
+    /// Source of the pose estimate (`stated`).
     pub odometry: OdometryModel,
     /// Angle random walk of the gyro, deg/√h, for `wheels_and_imu` (0.1: domain.md 5.5).
     pub gyro_walk_deg_per_root_hour: f64,
-    /// 1σ bias of the gyro, deg/h, one draw for the drive, for `wheels_and_imu` (1: domain.md 5.5).
+    /// 1σ bias of the gyro, deg/h, drawn once for the drive, for `wheels_and_imu` (1: domain.md 5.5).
     pub gyro_bias_deg_per_hour: f64,
     /// Whether the wheels leave tracks (false: the demonstration shows untouched ground; Kim09 §7.3).
     pub tracks: bool,
     /// Width of a wheel's track, m (0.16, as wide as a wheel; ours).
     pub track_width_m: f64,
-    /// How deep a wheel sinks in, m (0.01, ours).
+    /// Sinkage of a wheel, m (0.01, ours).
     pub track_depth_m: f64,
-    /// Slips staged for single stops, in any order (none; Kim09 §5.5).
+    /// Slip ratios given for single stops, in any order (none; Kim09 §5.5).
     pub forced_slip: Vec<ForcedSlip>,
-    /// Jumps of the estimated heading staged for single stops, in any order (none); no covariance knows of them.
+    /// Jumps of the estimated heading at single stops, in any order (none); no covariance includes them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub heading_jumps: Vec<HeadingJump>,
 }
@@ -129,7 +130,7 @@ impl RoverSettings {
         within("rover.track_depth_m", self.track_depth_m, 0.0, 0.1)
     }
 
-    /// The slip staged for the way to a stop, if any.
+    /// The given slip ratio of the motion to a stop, if any.
     pub(crate) fn forced_slip_to(&self, stop: usize) -> Option<f64> {
         if self.stuck_from_stop > 0 && stop >= self.stuck_from_stop as usize {
             return Some(1.0);

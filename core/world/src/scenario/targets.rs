@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 use super::range::within;
 use sightline_geometry::error::Result;
 
-/// Which of the pixels that satisfy the rule of the window become targets; `sim/targets` states each in full.
+/// Choice of targets among the pixels that satisfy the window rule; module `targets` defines each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Arrangement {
@@ -17,39 +17,39 @@ pub enum Arrangement {
     Rows,
     /// On the large rock, some on an occluding boundary (R119).
     Face,
-    /// The middle of what is seen of the rock on which the targets' centre lies.
+    /// The centre of the visible part of the rock at the targets' centre.
     Centre,
-    /// One target on each placed rock, in the middle of its visible part (R209).
+    /// One target on each placed rock, at the centre of its visible part (R209).
     Placed,
 }
 
-/// The rule that chooses targets; `sim/targets` states it in full.
+/// The rule that chooses targets; module `targets` defines it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TargetRule {
-    /// How many targets.
+    /// Number of targets.
     pub count: u32,
-    /// Which of the pixels that satisfy the rule become targets (drawn).
+    /// Choice among the pixels that satisfy the window rule (drawn).
     pub arrangement: Arrangement,
     /// Rows of the arrangement `rows` (2: Kim09 §5.1).
     pub rows: u32,
-    /// Targets of the arrangement `face` that lie on an occluding boundary (1: Kim09 §5.2).
+    /// Number of targets of the arrangement `face` that are on an occluding boundary (1: Kim09 §5.2).
     pub boundary: u32,
-    /// Greatest distance of a target's surface point from the targets' centre, m.
+    /// Largest distance of a target's surface point from the targets' centre, m.
     pub radius_m: f64,
-    /// Side of the square window on which the rule is tested, px of this image (21: ours; reduce it together
-    /// with the image, 11 at 512 and 7 at 256, or few windows are even enough).
+    /// Side of the square window on which the rule is tested, px of this image (21: ours; reduce it together with the
+    /// image, 11 at 512 and 7 at 256, or few windows are even enough).
     pub window_px: u32,
-    /// Greatest part of the window in shadow (0.20: ours).
+    /// Largest fraction of the window in shadow (0.20: ours).
     pub shadow_fraction: f64,
-    /// Greatest range of depth inside the window, as a part of the distance (0.10: ours).
+    /// Largest range of depth inside the window, relative to the distance (0.10: ours).
     pub depth_range_fraction: f64,
-    /// Whether targets must lie on rocks, off their occluding boundaries (true: Kim09 §5.2).
+    /// Whether targets must be on rocks, off their occluding boundaries (true: Kim09 §5.2).
     pub on_rocks: bool,
-    /// Least part of the window that lies on the same rock as the target (0.90, ours).
+    /// Smallest fraction of the window that is on the same rock as the target (0.90, ours).
     pub same_rock_fraction: f64,
-    /// Greatest angle between normal and line of sight, at the first and at the last stop, in 90 % of the window,
-    /// degrees (70, ours): a face that turns its edge to the rover is no place to drive to.
+    /// Largest angle between normal and line of sight, at the first and at the last stop, in 90 % of the window,
+    /// degrees (70, ours): a face seen edge-on is no place to drive to.
     pub incidence_deg: f64,
 }
 
@@ -72,7 +72,7 @@ impl Default for TargetRule {
 }
 
 impl TargetRule {
-    /// How many targets a world has to offer to serve: `count`, or the one that lies in the centre.
+    /// Number of targets that a world must offer to be usable: `count`, or at most 1 for the arrangement `centre`.
     pub fn wanted(&self) -> u32 {
         if self.arrangement == Arrangement::Centre { self.count.min(1) } else { self.count }
     }

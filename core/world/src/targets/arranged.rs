@@ -1,16 +1,15 @@
-//! Targets on the large rock: in straight rows, or all over it with some on its boundary; or the middle of one rock.
+//! Targets on the large rock, in straight rows or all over it with some on its boundary; or at the centre of one rock.
 //!
-//! **The large rock** is the one that most pixels near the targets' centre show, counted on a grid of every
-//! third pixel.
+//! **The large rock** is the one with the most pixels near the targets' centre, counted on a grid of every third pixel.
 //!
-//! **Rows** (R110). On every third image row of the large rock, the longest stretch of pixels that satisfy the
-//! window rule is found. The longest of all is the first row; the next is the longest at least a window's
-//! height away from those taken. Each row gets its share of the targets at equal spacing from end to end of its
-//! stretch, in whole pixels, so that in a true track both rows stay straight and even.
+//! **Rows** (R110). On every third image row of the large rock, the longest stretch of pixels that satisfy the window rule
+//! is found. The longest of all is the first row; the next is the longest at least a window's height away from those
+//! taken. Each row gets its share of the targets at equal spacing from end to end of its stretch, in whole pixels, so that
+//! correct tracks keep the rows straight and evenly spaced.
 //!
-//! **Centre.** Of all pixels that show the rock on which the targets' centre lies, the one nearest to their mean. The centre
-//! itself lies on top of the rock, and from afar that is the rock's upper edge, where nobody would pick a target (R20). **Placed**
-//! is the same for each placed rock.
+//! **Centre.** Of all pixels that show the rock at the targets' centre, the one nearest to their mean. The centre itself
+//! is on top of the rock, which from afar is the rock's upper edge, where no user would designate a target (R20).
+//! **Placed** is the same for each placed rock.
 //!
 //! Units: px. Frame: pixels of the first left image. Sources: papers.md R110, R115, R119.
 
@@ -25,13 +24,13 @@ use crate::targets::view::View;
 use crate::world::SurfaceId;
 use sightline_geometry::frames::{Pixel, Point3, Ray};
 
-/// Distance of the grid on which pixels are counted, px.
+/// Spacing of the grid on which pixels are counted, px.
 const STRIDE_PX: u32 = 3;
 
-/// How far the rock on which the targets' centre lies may be seen from it: it is cut by the edge there, px.
+/// Largest distance between the projected top of a rock, which is at its edge, and the pixels that show the rock, px.
 const EDGE_PX: i32 = 16;
 
-/// A place from which every rock near the targets' centre is below, above it, m.
+/// Height above the targets' centre from which every nearby rock is below, m.
 const HIGH_M: f64 = 10.0;
 
 /// A stretch of an image row whose pixels satisfy the window rule.
@@ -54,7 +53,7 @@ impl View<'_> {
             .step_by(STRIDE_PX as usize)
             .filter_map(|y| self.longest_stretch(rock, y, columns.clone()))
             .collect();
-        // Equal lengths keep their order from top to bottom.
+        // The sort is stable: equal lengths keep their order from top to bottom.
         stretches.sort_by_key(|stretch| std::cmp::Reverse(stretch.length()));
         let mut taken: Vec<&Stretch> = Vec::new();
         for stretch in &stretches {
@@ -79,13 +78,13 @@ impl View<'_> {
         chosen
     }
 
-    /// The target of the arrangement `centre`; the targets' centre where it does not lie on a rock, or none is seen of it.
+    /// The target of the arrangement `centre`; the targets' centre if it is not on a rock, or if the rock is not visible.
     pub(super) fn centre(&self) -> Option<Pixel> {
         let centre = self.world.targets_centre();
         self.middle_of_rock_at([centre.x, centre.y]).or_else(|| self.camera.project(&centre))
     }
 
-    /// The targets of the arrangement `placed`: the middle of the visible part of each placed rock, if it is in the image.
+    /// The targets of the arrangement `placed`: the centre of the visible part of each placed rock, if it is in the image.
     pub(super) fn on_placed(&self) -> Vec<Pixel> {
         let centre = self.world.targets_centre();
         let middle = |rock: &PlacedRock| self.middle_of_rock_at([centre.x + rock.x_m, centre.y + rock.y_m]);
@@ -94,7 +93,7 @@ impl View<'_> {
         middles.filter(|pixel| pixel.is_inside(width, height)).take(self.rule.count as usize).collect()
     }
 
-    /// The middle of the visible part of the rock at a place, x and y of the site, m; `None` without a visible rock there.
+    /// The centre of the visible part of the rock at x, y of the site frame, m; `None` without a visible rock there.
     fn middle_of_rock_at(&self, [x, y]: [f64; 2]) -> Option<Pixel> {
         let above = Point3::new(x, y, self.world.targets_centre().z) - HIGH_M * Vector3::z();
         let below = self.world.cast(&Ray { origin: above, direction: Vector3::z() })?;
@@ -107,8 +106,7 @@ impl View<'_> {
         pixels.min_by(|a, b| a.distance(middle).total_cmp(&b.distance(middle)))
     }
 
-    /// The pixels that show a rock and hang together, from the one nearest to `near` on, which is at most
-    /// [`EDGE_PX`] away.
+    /// The connected pixels that show a rock, starting from the one nearest to `near`, at most [`EDGE_PX`] away.
     fn seen_of(&self, rock: u32, near: [i32; 2]) -> BTreeSet<[i32; 2]> {
         let shows = |at: &[i32; 2]| self.shows(rock, Pixel::new(at[0].into(), at[1].into()));
         let offsets = (-EDGE_PX..=EDGE_PX).flat_map(|y| (-EDGE_PX..=EDGE_PX).map(move |x| [x, y]));
@@ -133,7 +131,7 @@ impl View<'_> {
         hit.is_some_and(|hit| hit.surface == SurfaceId::Rock(rock))
     }
 
-    /// The large rock with the columns and rows between which it is seen.
+    /// The large rock with the range of columns and rows in which it is visible.
     fn large_rock(&self) -> Option<(u32, [RangeInclusive<u32>; 2])> {
         let [columns, rows] = self.bounds()?;
         let mut seen: HashMap<u32, Vec<[u32; 2]>> = HashMap::new();
@@ -178,7 +176,7 @@ impl View<'_> {
 fn evenly_spaced(stretch: &Stretch, count: u32) -> Vec<Pixel> {
     let spacing_px = stretch.length() / count.saturating_sub(1).max(1);
     let at = |k: u32| Pixel::new((stretch.columns.start() + k * spacing_px).into(), stretch.y.into());
-    // A stretch shorter than the targets are many holds each pixel once.
+    // If the stretch has fewer pixels than there are targets, each pixel is used once.
     let fitting = if spacing_px == 0 { 1 } else { count };
     (0..fitting.min(count)).map(at).collect()
 }

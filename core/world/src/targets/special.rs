@@ -1,12 +1,12 @@
-//! Targets for what a tracker must notice: on occluding boundaries, and such as leave the picture.
+//! Targets for difficult cases that a tracker must detect: on occluding boundaries, and leaving the image.
 //!
-//! Both are drawn by the seed from the pixels near the targets' centre and are no part of a scenario's own targets.
+//! Both are drawn by the seed from the pixels near the targets' centre and are not part of a scenario's own targets.
 //!
-//! * On a *boundary*: rule 1 and 2 of the window, uneven in depth, with another surface farther behind in at least 15 %
-//!   of it (R20, R119). Here the surface behind may be the ground too, of which there is more than of rocks.
-//! * *Leaving*: rules 1, 3, 4 and 5 of the window at the first stop, and out of the left image at the last. The mast
-//!   points at the targets' centre, so that what lies aside of it leaves the image as the rover comes near. They may lie
-//!   farther from the centre than the scenario's own: within [`LEAVING_RADIUS_M`].
+//! * On a *boundary*: rules 1 and 2 of the window, uneven in depth, with another surface farther behind in at least 15 %
+//!   of it (R20, R119). Here the surface behind may also be the ground, which is more common than rocks.
+//! * *Leaving*: rules 1, 3, 4 and 5 of the window at the first stop, and outside the left image at the last. The mast
+//!   points at the targets' centre, so that points beside it leave the image as the rover comes near. They may be
+//!   farther from the centre than the scenario's own targets: within [`LEAVING_RADIUS_M`].
 //!
 //! Units: px, m. Frames: pixels of the first left image, rays in the site frame. Sources: papers.md R20, R88, R119.
 
@@ -20,19 +20,19 @@ use crate::traverse::TraverseIndex;
 use crate::world::World;
 use sightline_geometry::frames::Pixel;
 
-/// Greatest distance of a leaving target from the targets' centre, m.
+/// Largest distance of a leaving target from the targets' centre, m.
 const LEAVING_RADIUS_M: f64 = 3.0;
 
-/// Which pixels are asked for.
+/// Kind of the requested pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Special {
     /// On an occluding boundary.
     Boundary,
-    /// Out of the left image at the last stop.
+    /// Outside the left image at the last stop.
     Leaving,
 }
 
-/// Up to `count` pixels of a kind; fewer where the world has no more.
+/// Up to `count` pixels of a kind; fewer if the world has no more.
 pub fn choose_special(
     world: &World,
     scenario: &Scenario,
@@ -52,13 +52,13 @@ pub fn choose_special(
     })
 }
 
-/// Whether a pixel lies on an occluding boundary with another rock behind, as those of the arrangement `face` (R119).
+/// Whether a pixel is on an occluding boundary with another rock behind, as in the arrangement `face` (R119).
 pub fn is_on_boundary(world: &World, scenario: &Scenario, index: &TraverseIndex, pixel: Pixel) -> bool {
     View::of(world, scenario, index).is_some_and(|view| view.is_on_boundary(pixel))
 }
 
 impl View<'_> {
-    /// Whether a point is out of the left image at the last stop.
+    /// Whether a surface point is outside the left image at the last stop.
     fn leaves(&self, pixel: Pixel) -> bool {
         let point = surface_point(&self.world, &self.camera, pixel);
         point.is_some_and(|point| {

@@ -12,10 +12,10 @@ use crate::world::World;
 use sightline_geometry::camera::Camera;
 use sightline_geometry::frames::{Pixel, Point3};
 
-/// Draws per target before the search is given up.
+/// Draws per target before the search stops.
 const DRAWS_PER_TARGET: u32 = 2000;
 
-/// The world as the first stop sees it, and where it must be seen again.
+/// The world and the left camera at the first stop, and the cameras from which targets must still be visible.
 pub(super) struct View<'a> {
     pub(super) world: World,
     pub(super) camera: Camera,
@@ -42,7 +42,7 @@ impl<'a> View<'a> {
         })
     }
 
-    /// Up to `count` different pixels, drawn evenly near the targets' centre, that `accepts` accepts.
+    /// Up to `count` different pixels, drawn uniformly near the targets' centre, that satisfy `accepts`.
     pub(super) fn drawn(
         &self,
         count: u32,

@@ -2,20 +2,19 @@
 //!
 //! A pixel can become a target when
 //!
-//! 1. the window of `window_px` around it lies in the image;
-//! 2. its surface point is in both images of the last stop with its whole window, hidden by nothing: the mast
-//!    points at the targets' centre, and a target that left one eye could not be judged;
+//! 1. the window of `window_px` around it is in the image;
+//! 2. its surface point is unoccluded in both images of the last stop, with its whole window inside: the mast
+//!    points at the targets' centre, and a target that left one image could not be judged;
 //! 3. at most `shadow_fraction` of the window's pixels are in shadow (R21);
 //! 4. depth along the left camera's rays ranges over at most `depth_range_fraction` of the target's
 //!    distance inside the window (R21), the sky counting as infinitely far;
-//! 5. with `on_rocks`, it lies on a rock, and at least `same_rock_fraction` of the window's pixels lie on that
+//! 5. with `on_rocks`, it is on a rock, and at least `same_rock_fraction` of the window's pixels are on that
 //!    same rock: the papers' targets are on rocks and off their occluding boundaries (R20, R110);
-//! 6. nine tenths of the window's surface are turned to the left camera, at the first stop and at the last: normal
-//!    and line of sight differ by at most `incidence_deg`. An undercut face turns its edge to a camera that comes
-//!    near and looks down, and the place one came for is hardly to be seen.
+//! 6. nine tenths of the window's surface face the left camera, at the first stop and at the last: normal
+//!    and line of sight differ by at most `incidence_deg`. An undercut face is seen edge-on by a camera that comes
+//!    near and looks down, so that the target is hardly visible.
 //!
-//! A target *on a boundary* satisfies 1 and 2, and its window shows another rock that lies farther behind than 4
-//! allows (R119).
+//! A target *on a boundary* satisfies 1 and 2, and its window shows another rock farther behind than 4 allows (R119).
 //!
 //! Units: px, m. Frames: pixels of the first left image, rays in the site frame. Sources: papers.md R20, R21, R119.
 
@@ -26,18 +25,18 @@ use crate::world::{Hit, SurfaceId};
 use sightline_geometry::camera::Camera;
 use sightline_geometry::frames::{Pixel, Point3};
 
-/// Least part of the window that must be turned to the camera.
+/// Smallest fraction of the window that must face the camera.
 const FACING_FRACTION: f64 = 0.90;
 
-/// Least part of a boundary window that must show the rock behind.
+/// Smallest fraction of a boundary window that must show the rock behind.
 const BEHIND_FRACTION: f64 = 0.15;
 
-/// What the window around a pixel shows.
+/// The content of the window around a pixel.
 struct Window {
     middle: Hit,
     nearest_m: f64,
     farthest_m: f64,
-    /// Parts of the window's pixels, 0 to 1.
+    /// Fractions of the window's pixels, 0 to 1.
     shaded: f64,
     same: f64,
     facing: f64,
@@ -47,7 +46,7 @@ struct Window {
 }
 
 impl View<'_> {
-    /// Columns and rows between which all pixels within the radius lie; drawing outside would be in vain.
+    /// Ranges of columns and rows that contain all pixels within the radius.
     pub(super) fn bounds(&self) -> Option<[[u32; 2]; 2]> {
         let (camera, radius_m) = (&self.camera, self.rule.radius_m);
         let centre = self.world.targets_centre();
@@ -82,7 +81,7 @@ impl View<'_> {
             })
     }
 
-    /// Whether a pixel lies on an occluding boundary with another rock behind.
+    /// Whether a pixel is on an occluding boundary with another rock behind.
     pub(super) fn is_on_boundary(&self, pixel: Pixel) -> bool {
         self.is_near_and_seen_again(pixel)
             && self
@@ -98,7 +97,7 @@ impl View<'_> {
         })
     }
 
-    /// Whether a pixel's window lies in the first image, lit, even and on one rock, wherever it is later.
+    /// Whether a pixel's window is in the first image, lit, even and on one rock, regardless of later stops.
     pub(super) fn is_even_window(&self, pixel: Pixel) -> bool {
         let rule = self.rule;
         window_is_inside(&self.camera, pixel, rule)
@@ -120,7 +119,7 @@ impl View<'_> {
             && self.last.iter().all(seen_again)
     }
 
-    /// What the window around a pixel shows; nothing where it shows the sky.
+    /// Evaluates the window around a pixel; `None` if it shows the sky.
     fn window(&self, pixel: Pixel) -> Option<Window> {
         let half = i32::try_from(self.rule.window_px / 2).unwrap_or(i32::MAX);
         let middle_ray = self.camera.ray(pixel)?;
@@ -149,20 +148,20 @@ impl View<'_> {
 }
 
 impl Window {
-    /// Whether its depth ranges over little (R21).
+    /// Whether its range of depth is small (R21).
     fn is_even(&self, rule: &TargetRule) -> bool {
         self.farthest_m - self.nearest_m <= rule.depth_range_fraction * self.middle.distance_m
     }
 }
 
-/// Whether the whole window around a pixel lies in the image.
+/// Whether the whole window around a pixel is in the image.
 fn window_is_inside(camera: &Camera, pixel: Pixel, rule: &TargetRule) -> bool {
     let half = f64::from(rule.window_px / 2);
     let corners = [pixel.offset(-half, -half), pixel.offset(half, half)];
     corners.iter().all(|corner| corner.is_inside(camera.width(), camera.height()))
 }
 
-/// Whether a surface is turned to both places enough.
+/// Whether a surface faces both camera positions.
 fn faces(hit: &Hit, places: &[Point3; 2], rule: &TargetRule) -> bool {
     places.iter().all(|place| hit.normal.angle(&(place - hit.point)) <= rule.incidence_deg.to_radians())
 }

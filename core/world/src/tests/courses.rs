@@ -1,4 +1,4 @@
-//! Drives of moves: the papers' drives come out of the settings, and impossible ones are refused.
+//! Drives of moves: the papers' drives follow from the settings, and impossible ones are rejected.
 
 use crate::rover::approach::distances_m;
 use crate::rover::plan::{ground_extent_m, planned};
@@ -29,7 +29,7 @@ pub(super) fn moves(
     }
 }
 
-/// The left camera of each stop relative to a targets' centre: level x and y, and height, m.
+/// The left camera of each stop relative to a targets' centre: horizontal x and y, and height, m.
 fn cameras(drive: &TrueDrive, centre: Point3) -> Vec<[f64; 3]> {
     let mast = Mast::spirit();
     let of_stop = |stop: &crate::rover::scene::TrueStop| {
@@ -52,7 +52,7 @@ pub(super) fn yaw_deg(pose: &Pose) -> f64 {
     pose.rotation.euler_angles().2.to_degrees()
 }
 
-/// Whether a number is what it should be.
+/// Asserts that a number is within `tolerance` of the expected one.
 pub(super) fn close(found: f64, wanted: f64, tolerance: f64) {
     assert!((found - wanted).abs() <= tolerance, "{found} is not {wanted} ± {tolerance}");
 }
@@ -83,7 +83,7 @@ fn forward_arc_and_turn_end_where_geometry_says() {
         [-1.5, 0.0, 0.0],
         [-1.5 + root, 2.0 - root, 45.0],
         [0.5, 2.0, 90.0],
-        // Backwards around a centre 0.5 m to the left turns right: the rover then looks back along −x.
+        // Backwards around a centre 0.5 m to the left turns right: the rover then faces −x.
         [1.0, 1.5, 180.0],
         [1.0, 1.5, 95.0],
         [1.0, 1.5, 10.0],
@@ -97,7 +97,7 @@ fn forward_arc_and_turn_end_where_geometry_says() {
 
 #[test]
 fn a_crab_of_70_degrees_at_7_m_has_15_stops_and_chords_of_61_cm() {
-    // R118: the circle of 7 m is that of the camera in the level.
+    // R118: the circle of 7 m is that of the camera in the horizontal plane.
     let crab = Move::Crab { angle_deg: 70.0, stops: 14 };
     let start_m = 7.1675;
     let settings = moves(start_m, 0.0, 0.0, &[crab]);
@@ -152,9 +152,9 @@ fn checkout_1_comes_out_of_its_moves() {
     assert_eq!(cameras.len(), 8);
     let level = |[dx, dy, _]: [f64; 3]| [dx.hypot(dy), (-dy).atan2(-dx).to_degrees()];
     let views: Vec<[f64; 2]> = cameras.into_iter().map(level).collect();
-    // R132, positions 1, 4, 7 and 8; R131: about 4 m throughout. The printed distances agree with the printed
-    // path when they are taken in the level; as slant distances from 1.54 m above the rock they do so only just:
-    // the best start, 4.080 m, 60.16°, −71.56°, is off by 10 cm and by 1° at three of the four.
+    // R132, positions 1, 4, 7 and 8; R131: about 4 m throughout. The printed distances agree with the printed path when
+    // taken as horizontal; as slant distances from 1.54 m above the rock they agree only just: the best start, 4.080 m,
+    // 60.16°, −71.56°, is off by 10 cm and by 1° at three of the four.
     let printed = [(1, 4.00, -3.4), (4, 3.67, 17.5), (7, 3.73, 34.7), (8, 3.68, 50.1)];
     for (position, distance_m, azimuth_deg) in printed {
         let [distance, azimuth] = views[position - 1];
@@ -162,7 +162,7 @@ fn checkout_1_comes_out_of_its_moves() {
         close(azimuth, azimuth_deg, 0.8);
     }
     assert!(views.iter().all(|[distance, _]| (distance - 3.8).abs() < 0.2), "{views:?}");
-    // R133: the azimuth changes from position to position; R135: none by the turn in place, but for the mast.
+    // R133: the azimuth changes from position to position; R135: the turn in place changes only the mast.
     let changes = [6.01, 6.38, 8.53, 8.58, 8.62, 0.00, 15.44];
     for (pair, change_deg) in views.windows(2).zip(changes) {
         close(pair[1][1] - pair[0][1], change_deg, 0.65);
@@ -174,7 +174,7 @@ fn checkout_2_takes_15_steps() {
     let distances = distances_m(9.65, 1.92, 0.1021);
     assert_eq!(distances.len(), 16);
     close(distances[15], 1.92, 5e-3);
-    // R138: magnification 1.09 to 1.13 per update, 5.03 in all; R137 shows images at 6.11 and 3.05 m.
+    // R138: magnification 1.09 to 1.13 per update, 5.03 in total; R137 shows images at 6.11 and 3.05 m.
     close(distances[0] / distances[1], 1.11, 0.02);
     for shown_m in [6.11, 3.05] {
         assert!(distances.iter().any(|distance| (distance / shown_m - 1.0).abs() < 0.06), "{distances:?}");
@@ -183,7 +183,7 @@ fn checkout_2_takes_15_steps() {
 
 #[test]
 fn checkout_3_comes_out_of_its_moves() {
-    // R141: seven turns of 10° to the left on arcs 10 cm long, forward and back in turn.
+    // R141: seven turns of 10° to the left on arcs 10 cm long, alternately forward and back.
     let radius_m = 0.1 / 10f64.to_radians();
     let turn = |forward: bool| {
         let (radius_m, angle_deg) = if forward { (-radius_m, 10.0) } else { (radius_m, -10.0) };
@@ -301,7 +301,7 @@ fn tracks_follow_the_wheels_stop_by_stop() {
     let (from, to) = (lines[1].points_in_site[0], lines[1].points_in_site[laid[1] - 1]);
     assert!((from[0] - start.x - 0.7).hypot(from[1] - 0.53) < 1e-12, "{from:?}");
     assert!((to[0] - from[0] - 0.5).hypot(to[1] - from[1]) < 1e-9, "{to:?}");
-    // Turning about the middle, each wheel stays on its circle.
+    // In a turn about the rover's origin, each wheel stays on its circle.
     for line in lines {
         let radius = |point: &[f64; 2]| (point[0] - start.x - 0.5).hypot(point[1]);
         let radius_m = radius(&line.points_in_site[laid[1]]);
@@ -315,7 +315,7 @@ fn the_ground_reaches_behind_the_targets_from_every_stop() {
     assert_eq!(ground_extent_m(&DriveSettings::default()), [[-2.5, 10.0 + 0.3 + 9.0], [-7.0, 7.0]]);
     let crab = moves(7.0, 0.0, 0.0, &[Move::Crab { angle_deg: 70.0, stops: 14 }]);
     let [[x_from, x_to], [y_from, y_to]] = ground_extent_m(&crab);
-    // From the last stop the view runs on 9 m beyond the centre in the direction of 70°.
+    // From the last stop the view extends 9 m beyond the centre in the direction of 70°.
     assert!(x_from <= -2.5 && x_to >= 16.3 && y_to > 9.0 * 70f64.to_radians().sin() && y_from < -8.5);
 }
 
@@ -337,7 +337,7 @@ fn wheels_climb_a_rock_of_15_cm_and_a_drive_over_one_of_30_cm_is_refused() {
         let touched = stands.iter().map(|stand| stand.contacts_in_site[wheel]);
         touched.min_by(|a, b| a.z.total_cmp(&b.z)).unwrap()
     };
-    // The right front and rear wheels go over the rock and touch its very surface; the left ones stay on the plain.
+    // The right front and rear wheels go over the rock and touch its actual surface; the left ones stay on the plain.
     for top in [1, 5].map(highest) {
         let down = Ray { origin: Point3::new(top.x, top.y, -2.0), direction: Vector3::z() };
         let surface = world.cast(&down).unwrap();

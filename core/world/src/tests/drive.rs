@@ -34,7 +34,7 @@ fn the_rover_stands_level_on_level_ground_and_tilts_with_it() {
         let wheels = [[0.7, -0.53], [0.7, 0.53], [-0.7, -0.53], [-0.7, 0.53]];
         for [x, y] in wheels {
             let contact = pose * sightline_geometry::frames::Point3::new(x, y, 0.294);
-            // Six wheels on a plane: a wheel is off by what the ground is rough over its base.
+            // Six wheels on a plane: a wheel is off by the roughness of the ground over its base.
             assert!((contact.z - demo.world.ground_z_at(contact.x, contact.y)).abs() < 0.04);
         }
         let (roll, pitch, yaw) = pose.rotation.euler_angles();
@@ -79,7 +79,7 @@ fn estimates_have_the_stated_errors_over_many_seeds() {
         }
     }
     let rms = |v: &[f64]| (v.iter().map(|x| x * x).sum::<f64>() / v.len() as f64).sqrt();
-    // 4800 steps: a standard deviation is known to 1 %.
+    // 4800 steps determine a standard deviation to 1 %.
     assert!((rms(&along) / 0.01 - 1.0).abs() < 0.04, "{}", rms(&along));
     assert!((rms(&across) / 0.005 - 1.0).abs() < 0.04, "{}", rms(&across));
     assert!((rms(&attitude) / 0.1 - 1.0).abs() < 0.03, "{}", rms(&attitude));
@@ -118,7 +118,7 @@ fn a_miscalibrated_mast_shows_in_the_true_cameras_only() {
         let (left, right) = rig.cameras_in_rover(Some(angles));
         let truth = stop.truth.as_ref().unwrap();
         assert_eq!((&truth.left_camera, &truth.right_camera), (&Some(left), &Some(right)));
-        // The mast looks to the right of the targets and below them: they appear to the left and above.
+        // The mast points to the right of the targets and below them: they appear to the left and above.
         let pixel =
             true_camera_in_site(stop, Eye::Left).unwrap().project(&demo().world.targets_centre()).unwrap();
         assert!(pixel.x < 510.0 && pixel.y < 510.0, "{pixel:?}");
@@ -174,7 +174,7 @@ fn targets_satisfy_the_rule_and_follow_from_the_seed() {
     assert!((share - 1.0).abs() < 1e-12, "{share}");
 }
 
-/// The part of the targets that lie on rocks, 0 to 1.
+/// The fraction of the targets that are on rocks, 0 to 1.
 fn share_on_rocks(world: &World, index: &TraverseIndex, targets: &[Pixel]) -> f64 {
     let Some(camera) = index.stops.first().and_then(|stop| true_camera_in_site(stop, Eye::Left)) else {
         return 0.0;

@@ -1,5 +1,5 @@
-//! Fiducials found in the pictures lie where the camera models put them: boards by all their edges, balls by
-//! the middle of their outline; near and far, in the middle of the image and in its corner, for all three models.
+//! Fiducials in rendered images are where the camera models project them: boards by all their edges, balls by the centre
+//! of their outline; near and far, in the middle of the image and in its corner, for all three models.
 
 use nalgebra::Vector2;
 
@@ -9,13 +9,13 @@ use sightline_geometry::camera::Camera;
 use sightline_geometry::frames::{Pixel, Point3, Pose, Ray, Vector3};
 use sightline_vision::image::GrayImage;
 
-/// How far from its projection a fiducial may be found, px.
+/// Largest accepted distance of a fiducial from its projection, px.
 const TOLERANCE_PX: f64 = 0.02;
 /// Squares of a board along each side.
 const SQUARES: i32 = 6;
 
-/// A bare, dark plain in light that is the same from all sides: nothing but the fiducials has an edge, and a ball
-/// is as bright at its limb as in its middle.
+/// A bare, dark plain in uniform light: only the fiducials have edges, and a ball is as bright at its limb as at its
+/// centre.
 fn empty_world() -> (Scenario, World) {
     let mut scenario = Scenario::default();
     (scenario.rocks.area_fraction, scenario.rocks.cluster_count) = (0.0, 0);
@@ -29,7 +29,7 @@ fn empty_world() -> (Scenario, World) {
     (scenario, world)
 }
 
-/// The camera carried 100 m up and turned until its optical axis points straight down.
+/// The camera moved 100 m up and rotated until its optical axis points straight down.
 fn looking_down(camera: &Camera) -> Camera {
     let down =
         nalgebra::UnitQuaternion::rotation_between(&camera.model.optical_axis(), &Vector3::z()).unwrap();
@@ -49,7 +49,7 @@ fn cameras() -> Vec<(&'static str, Camera)> {
         .into()
 }
 
-/// The picture around a pixel.
+/// The rendered image around a pixel.
 fn picture(scenario: &Scenario, world: &World, camera: &Camera, pixel: Pixel) -> (Region, GrayImage) {
     let first = |v: f64| (v.round() as u32).saturating_sub(56);
     let region = Region { x: first(pixel.x), y: first(pixel.y), width: 112, height: 112 };
@@ -59,7 +59,7 @@ fn picture(scenario: &Scenario, world: &World, camera: &Camera, pixel: Pixel) ->
     )
 }
 
-/// The picture's value between pixels, bilinear; px of the region.
+/// The image's value between pixels, bilinear; px of the region.
 fn value(image: &GrayImage, x: f64, y: f64) -> f64 {
     let (ix, iy) = (x.floor(), y.floor());
     let (u, v) = (x - ix, y - iy);
@@ -67,7 +67,7 @@ fn value(image: &GrayImage, x: f64, y: f64) -> f64 {
     (1.0 - v) * ((1.0 - u) * at(0, 0) + u * at(1, 0)) + v * ((1.0 - u) * at(0, 1) + u * at(1, 1))
 }
 
-/// The bright part of a pixel, from 7 × 7 rays of the camera model met with the board's plane in closed form.
+/// The bright fraction of a pixel, from 7 × 7 rays of the camera model intersected with the board's plane in closed form.
 fn bright_part(camera: &Camera, board: &Solid, x: f64, y: f64) -> f64 {
     let Shape::Box([out, left, up]) = board.shape else { panic!("a board is a box") };
     let face = board.middle + out;
@@ -85,7 +85,7 @@ fn bright_part(camera: &Camera, board: &Solid, x: f64, y: f64) -> f64 {
     bright.count() as f64 / 49.0
 }
 
-/// How far the board in a picture lies from where the camera model puts it, px: least squares of
+/// Offset of the board in an image from its projection by the camera model, px: least squares of
 /// `level = a + b part + c ∂part/∂x + d ∂part/∂y`, since a shift of s px gives c = −b s.
 fn shift(image: &GrayImage, region: &Region, camera: &Camera, board: &Solid) -> Vector2<f64> {
     let (width, height) = (region.width as usize, region.height as usize);
@@ -110,13 +110,13 @@ fn shift(image: &GrayImage, region: &Region, camera: &Camera, board: &Solid) -> 
     Vector2::new(-fit[2] / fit[1], -fit[3] / fit[1])
 }
 
-/// A board that faces the camera on a pixel's ray, its squares 12 px wide there, the first one dark.
+/// A board that faces the camera on a pixel's ray, with squares 12 px wide there, the first one dark.
 fn board(camera: &Camera, ray: &Ray, range_m: f64) -> Solid {
     let pixel = camera.project(&ray.at(range_m)).unwrap();
     let beside = camera.ray(pixel.offset(1.0, 0.0)).unwrap();
     let square_m = 12.0 * range_m * (beside.direction - ray.direction).norm();
     let half_m = 0.5 * f64::from(SQUARES) * square_m;
-    // Turned a little in its plane, so that no edge runs along the pixels.
+    // Rotated a little in its plane, so that no edge is parallel to the pixel rows.
     let right = (beside.direction - ray.direction).normalize();
     let turn = nalgebra::Rotation3::from_axis_angle(&nalgebra::Unit::new_normalize(ray.direction), 0.2);
     let right = turn * (right - ray.direction * right.dot(&ray.direction)).normalize();
@@ -147,7 +147,7 @@ fn checkerboards_are_found_where_the_models_project_them() {
     }
 }
 
-/// Where a picture passes the mean of what lies 4 px inside and 4 px outside of an edge, px along `direction`.
+/// Position along `direction`, px, at which an image passes the mean of the values 4 px inside and 4 px outside an edge.
 fn edge(image: &GrayImage, at: Vector2<f64>, direction: Vector2<f64>) -> f64 {
     let along = |s: f64| value(image, at.x + s * direction.x, at.y + s * direction.y);
     let half = 0.5 * (along(-4.0) + along(4.0));
@@ -198,7 +198,7 @@ fn balls_are_found_where_the_cone_of_their_outline_meets_the_image() {
     }
 }
 
-/// The outline of a ball as the camera sees it: where its tangent rays meet the image, px.
+/// The outline of a ball in the image: the projections of its tangent rays, px.
 fn outline(camera: &Camera, middle: &Point3, radius_m: f64) -> Vec<Vector2<f64>> {
     let pixel = camera.project(middle).unwrap();
     let origin = camera.ray(pixel).unwrap().origin;
@@ -207,7 +207,7 @@ fn outline(camera: &Camera, middle: &Point3, radius_m: f64) -> Vec<Vector2<f64>>
     let axis = to_middle / distance_m;
     let aside = axis.cross(&Vector3::z()).normalize();
     let other = axis.cross(&aside);
-    // Tangent points: at distance d cos²α from the eye along the axis, r cos α beside it, with sin α = r/d.
+    // Tangent points: at distance d cos²α from the camera along the axis, r cos α beside it, with sin α = r/d.
     let sine = radius_m / distance_m;
     let cosine = (1.0 - sine * sine).sqrt();
     (0..72)
@@ -243,7 +243,7 @@ fn left_and_right_agree_through_triangulation() {
             camera.ray(expected.offset(off.x, off.y)).unwrap()
         });
         let met = sightline_geometry::estimate::triangulate::midpoint(&rays[0], &rays[1]).unwrap();
-        // What 0.02 px in each eye make of the range: Z²/(f B) per px of disparity (domain.md 3.4).
+        // Effect of 0.02 px in each image on the range: Z²/(f B) per px of disparity (domain.md 3.4).
         let tolerance_m = 2.0 * TOLERANCE_PX * range_m * range_m / (1210.0 * 0.2003);
         let off_m = (met.point - board.middle).norm();
         assert!(off_m < tolerance_m, "{range_m} m: {off_m} m, allowed {tolerance_m} m");

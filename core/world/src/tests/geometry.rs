@@ -1,11 +1,11 @@
-//! Rays meet what they should, shadows fall where they should.
+//! Rays meet the correct surfaces, and shadows are in the correct places.
 
 use nalgebra::Vector2;
 
 use super::{SurfaceId, World, demo, true_stops, unit};
 use sightline_geometry::frames::{Point3, Ray, Vector3};
 
-/// The first hit by asking every rock and marching over the ground, without tree, grid or pyramid.
+/// The first hit by testing every rock and marching over the ground, without tree, grid or pyramid.
 fn brute_force(world: &World, ray: &Ray, to_m: f64) -> Option<(f64, SurfaceId)> {
     let rocks = world.rocks().iter().enumerate().filter_map(|(index, rock)| {
         let interval = rock.interval(ray)?;
@@ -102,7 +102,7 @@ fn shadows_agree_with_asking_every_rock() {
             });
         let by_ground =
             (1..400).map(|step| to_sun.at(f64::from(step) * 1e-3)).any(|p| p.z > world.ground_z_at(p.x, p.y));
-        // The demonstration's ground is nowhere as steep as its sun is high.
+        // The demonstration's ground is nowhere as steep as its sun's elevation.
         assert!(!by_ground || hit.surface != SurfaceId::Ground);
         assert_eq!(world.in_shadow(&hit.point), by_rock, "{hit:?}");
         if by_rock { dark += 1 } else { lit += 1 }
@@ -126,7 +126,7 @@ fn a_low_sun_makes_the_ground_shade_itself() {
         let to_sun = Ray { origin: point, direction: world.to_sun() };
         let depth_m = |t: f64| to_sun.at(t).z - world.ground_z_at(to_sun.at(t).x, to_sun.at(t).y);
         let deepest_m = (1..4000).map(|k| depth_m(f64::from(k) * 2e-3)).fold(f64::NEG_INFINITY, f64::max);
-        // Rays that the march can neither call blocked nor free are left out.
+        // Rays that the march cannot clearly classify as blocked or free are left out.
         if deepest_m.abs() > 2e-4 {
             assert_eq!(world.in_shadow(&point), deepest_m > 0.0, "{point:?} {deepest_m}");
             dark += u32::from(deepest_m > 0.0);
@@ -153,7 +153,7 @@ fn the_rover_drives_up_down_and_across_slopes_and_leans_as_they_do() {
             assert!((lean_deg - slope_deg).abs() < 0.8, "{slope_deg} {azimuth_deg}: {lean_deg}");
             assert!(down.cross(&uphill).norm() > 0.9);
         }
-        // Beyond the grid the plane goes on as far as the slope reaches.
+        // Beyond the grid the plane continues to the end of the slope.
         let far = Point3::new(50.0, 20.0, -80.0);
         let hit = world.cast(&Ray { origin: far, direction: Vector3::z() }).unwrap();
         let rise_m = slope_deg.to_radians().tan() * (50.0 * angle.cos() + 20.0 * angle.sin());

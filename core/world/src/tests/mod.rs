@@ -1,4 +1,4 @@
-//! Claims about the simulator as a whole: rays, pictures, the drive and its targets.
+//! Claims about the simulator as a whole: rays, images, the drive and its targets.
 //!
 //! All tests share one world, that of the demonstration; it is built once.
 
@@ -36,7 +36,7 @@ fn demo() -> &'static Demo {
     })
 }
 
-/// The true stops of a scenario that can be driven, in the order of the drive.
+/// The true stops of a possible scenario, in driving order.
 fn true_stops(world: &World, scenario: &Scenario) -> Vec<TrueStop> {
     true_drive(world, scenario, Cancel::default()).unwrap().stops
 }

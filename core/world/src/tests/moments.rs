@@ -1,4 +1,4 @@
-//! Moments of a drive on scenes whose truth is known in closed form: ranges, normals, shadows and what hides what.
+//! Moments of a drive on scenes with closed-form ground truth: ranges, normals, shadows and occlusion.
 
 use super::*;
 use crate::moment::Moment;
@@ -89,7 +89,7 @@ fn a_ball_shades_the_ellipse_that_the_sun_s_cylinder_cuts_from_the_ground() {
         if aside_m < 0.4 { shaded += 1 } else { lit += 1 }
     }
     assert!(shaded > 200 && lit > 2000, "{shaded} {lit}");
-    // The half of the ball that looks away from the sun is dark, the other is lit.
+    // The half of the ball that faces away from the sun is dark, the other is lit.
     for direction in [to_sun, -to_sun] {
         let point = middle + direction * 0.4;
         assert_eq!(world.in_shadow(&point), direction == -to_sun);
@@ -136,7 +136,7 @@ fn an_occluder_hides_the_centre_at_its_stops_and_its_edges_are_where_they_should
         let (eye, ahead) = (camera.model.centre(), centre - camera.model.centre());
         let right = Vector3::z().cross(&Vector3::new(ahead.x, ahead.y, 0.0).normalize());
         for (aside_m, is_block) in [(0.299, true), (0.301, false), (-0.299, true), (-0.301, false)] {
-            // The front face stands 5 mm before the middle; the ray passes it near there.
+            // The front face is 5 mm in front of the centre; the ray passes it near there.
             let target = eye + 0.5 * ahead + aside_m * right;
             let ray = Ray { origin: eye, direction: (target - eye).normalize() };
             let met = now.cast(&ray).unwrap().surface;

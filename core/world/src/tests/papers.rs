@@ -1,13 +1,13 @@
-//! The library's scenarios, as they are shipped, beside the numbers of the papers that they stage.
+//! The library's scenarios as shipped, against the numbers of the papers that they stage.
 //!
-//! Each scenario's world is built and its drive indexed, and nothing is rendered. What is measured:
+//! Each scenario's world is built and its drive indexed; nothing is rendered. Measured quantities:
 //!
 //! ```text
-//! distance        │centre − C│ of the true left camera, m            level: the same in the level
+//! distance        │centre − C│ of the true left camera, m            level: the same, horizontal
 //! azimuth         of the line of sight in the site frame, deg         (R135)
 //! magnification   D_before / D_after                                  K-Eq 6
 //! roll            direction of p_0 → p_0 + 0.05 m H_x in the next image, deg, H_x of the camera before (K-Eq 7–10)
-//! rock's width    how far the placed rock reaches across the line of sight of the stop halfway, above the ground, m
+//! rock's width    extent of the placed rock across the line of sight of the middle stop, above the ground, m
 //! ```
 //!
 //! Frames: site; pixels. Sources: papers.md R52, R118, R119, R131–R134, R137, R138, R140–R145, R209, R226.
@@ -20,7 +20,7 @@ use sightline_geometry::camera::Camera;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::{Point3, Ray, Vector3};
 
-/// A scenario of the library with what its paper's numbers are compared with.
+/// A scenario of the library with the quantities to compare with its paper.
 struct Staged {
     name: &'static str,
     scenario: Scenario,
@@ -53,7 +53,7 @@ impl Staged {
         }
     }
 
-    /// From the left camera of a stop to the targets' centre.
+    /// Vector from the left camera of a stop to the targets' centre.
     fn sight(&self, stop: usize) -> Vector3 {
         self.world.targets_centre() - self.cameras[stop].model.centre()
     }
@@ -82,18 +82,18 @@ impl Staged {
         (to.y - from.y).atan2(to.x - from.x).to_degrees()
     }
 
-    /// The smallest and the largest of what changes from each stop to the next.
+    /// The smallest and the largest change from stop to stop.
     fn steps(&self, of: impl Fn(usize, usize) -> f64) -> [f64; 2] {
         let steps = || (1..self.cameras.len()).map(|after| of(after - 1, after));
         [steps().fold(f64::INFINITY, f64::min), steps().fold(f64::NEG_INFINITY, f64::max)]
     }
 
-    /// How far the left camera moves in the level from one stop to the next, m.
+    /// Horizontal motion of the left camera from one stop to the next, m.
     fn chord_m(&self, before: usize, after: usize) -> f64 {
         (self.sight(before) - self.sight(after)).xy().norm()
     }
 
-    /// How far the rover's origin moves in the level between two stops, m.
+    /// Horizontal motion of the rover's origin between two stops, m.
     fn moved_m(&self, before: usize, after: usize) -> f64 {
         let place = |stop: usize| self.index.stops[stop].truth.as_ref().unwrap().site_from_rover.to_pose();
         (place(before).translation.vector - place(after).translation.vector).xy().norm()
@@ -107,7 +107,7 @@ impl Staged {
         self.cameras.len() as f64
     }
 
-    /// How far the rock on which the targets' centre lies reaches across the line of sight of the stop halfway, m.
+    /// Extent of the rock at the targets' centre across the line of sight of the middle stop, m.
     fn rock_width_m(&self) -> f64 {
         let centre = self.world.targets_centre();
         let down = Ray { origin: centre - Vector3::z(), direction: Vector3::z() };
@@ -133,7 +133,7 @@ impl Staged {
     }
 }
 
-/// A number of a paper and how near to it ours must be.
+/// A number of a paper with the tolerance of ours.
 struct Claim {
     source: &'static str,
     what: &'static str,
@@ -142,7 +142,7 @@ struct Claim {
     ours: fn(&Staged) -> f64,
 }
 
-/// Says which numbers are missed, the paper's beside ours.
+/// Reports the numbers that are out of tolerance, the paper's beside ours.
 fn check(name: &'static str, claims: &[Claim]) -> Staged {
     let staged = Staged::new(name);
     let missed: Vec<String> = claims
@@ -169,8 +169,8 @@ const fn claim(
 
 #[test]
 fn checkout_1_as_shipped_meets_the_printed_path_distances_azimuths_and_rolls() {
-    // The relief of 2 cm tilts the rover, and with it each roll by up to 1.2°; on the whole our rolls are a tenth
-    // smaller than the printed ones, as if the paper's camera stood 15 cm higher above its target.
+    // The relief of 2 cm tilts the rover, and with it each roll by up to 1.2°; on the whole our rolls are a tenth smaller
+    // than the printed ones, which fit a camera 15 cm higher above its target.
     check(
         "checkout-1",
         &[
@@ -227,8 +227,8 @@ fn checkout_3_as_shipped_meets_the_printed_turn_and_distances_and_leaves_tracks(
     let staged = check(
         "checkout-3",
         &[
-            // R143: one seed, 7 updates of the turn, 10 of backing up, 4 and 4 of the return; besides, a stop where the
-            // rover has backed to 4 m, and one where it has turned towards the target.
+            // R143: one seed, 7 updates of the turn, 10 of backing up, 4 and 4 of the return; in addition, a stop where
+            // the rover has backed to 4 m, and one where it has turned towards the target.
             claim("R143", "stops", 28.0, 0.0, Staged::stops),
             claim("R140", "distance at the seed, m", 3.0, 1e-6, |s| s.distance_m(0)),
             claim("R140", "turn, deg", -70.0, 1e-6, |s| s.yaw_deg[7] - s.yaw_deg[0]),
@@ -262,7 +262,7 @@ fn checkout_4_as_shipped_drives_from_4_7_m_to_within_2_m_on_bedrock() {
 
 #[test]
 fn sideways_as_shipped_circles_at_7_m_and_its_face_is_seen_first_and_last() {
-    // The circle is that of the line of sight of a target on level ground; on the rock it is 1.6 % wider.
+    // The circle is that of the line of sight to a target on level ground; on the rock it is 1.6 % wider.
     let staged = check(
         "sideways-70",
         &[
@@ -317,7 +317,7 @@ fn the_rock_of_a_checkout_is_picked_in_the_middle_of_what_is_seen_of_it() {
 
 #[test]
 fn approaches_as_shipped_stop_where_the_papers_arithmetic_puts_them() {
-    // R226: what is left after skipping n images is a step of 1 − 0.95ⁿ⁺¹.
+    // R226: after skipping n images a step is 1 − 0.95ⁿ⁺¹.
     let of_stop = |s: &Staged, stop: usize| 1.0 - s.distance_m(stop) / s.distance_m(0);
     let staged = check(
         "approach-5",

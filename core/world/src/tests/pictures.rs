@@ -1,4 +1,4 @@
-//! Pictures are true to the geometry, to their seed, and to nothing else.
+//! Rendered images depend on the geometry, on their seed, and on nothing else.
 
 use std::sync::atomic::AtomicBool;
 
@@ -17,7 +17,7 @@ fn region(world: &World, scenario: &Scenario, camera: &Camera, region: Region) -
     clean_radiance(world, scenario, camera, region, &AtomicBool::new(false)).unwrap()
 }
 
-/// What is recorded of a part of a picture under the fixed exposure.
+/// The recorded region of an image under the fixed exposure.
 fn recorded(
     world: &World,
     scenario: &Scenario,
@@ -51,12 +51,12 @@ fn correlation(a: &[f64], b: &[f64]) -> f64 {
     sum(&|p, q| p * q) / (sum(&|p, _| p * p) * sum(&|_, q| q * q)).sqrt()
 }
 
-/// Where a parabola through three values one step apart has its top, in steps.
+/// Position of the maximum of a parabola through three values one step apart, in steps.
 fn top(low: f64, middle: f64, high: f64) -> f64 {
     0.5 * (low - high) / (low - 2.0 * middle + high)
 }
 
-/// The shift (px) of the right picture against where geometry puts the left patch, by best correlation.
+/// The shift (px) of the right image relative to the projected left patch, by best correlation.
 fn stereo_shift(demo: &Demo, stop: usize, pixel: Pixel) -> Option<[f64; 2]> {
     let (left, right) = (camera(&demo.index, stop, Eye::Left), camera(&demo.index, stop, Eye::Right));
     let half = 10i32;
@@ -69,7 +69,7 @@ fn stereo_shift(demo: &Demo, stop: usize, pixel: Pixel) -> Option<[f64; 2]> {
         for dx in -half..=half {
             let at = pixel.offset(f64::from(dx), f64::from(dy));
             let hit = demo.world.cast(&left.ray(at)?)?;
-            // What only one eye sees, or what lies on two rocks, would test something else.
+            // Points that only one camera sees, or on two rocks, would test something else.
             let seen_by_both = demo.world.is_visible(&right.model.centre(), &hit.point);
             if hit.surface != middle.surface || !seen_by_both {
                 return None;
@@ -112,13 +112,13 @@ fn a_patch_of_the_left_picture_correlates_best_where_geometry_puts_it_in_the_rig
         along.sort_by(f64::total_cmp);
         let bias = along[along.len() / 2];
         along.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
-        // One patch in ten may show an edge of a rock, whose faces do not shine alike to both eyes.
+        // One patch in ten may show an edge of a rock, whose faces differ in brightness between the cameras.
         let (median, most) = (along[along.len() / 2].abs(), along[along.len() * 9 / 10].abs());
         assert!(bias.abs() < 0.005 && median < 0.02 && most < 0.05, "{bias} {median} {most}: {shifts:?}");
     }
 }
 
-/// The demonstration's rocks, nearly black under an even sky on nearly white ground: pure silhouettes.
+/// The demonstration's rocks, nearly black under a uniform sky on nearly white ground: pure silhouettes.
 fn silhouettes() -> (Scenario, World) {
     let mut scenario = demo().scenario.clone();
     (scenario.texture.soil_albedo, scenario.texture.rock_albedo) = (0.9, 0.02);
@@ -128,13 +128,13 @@ fn silhouettes() -> (Scenario, World) {
     (scenario.texture.dust, scenario.sun.diffuse_fraction, scenario.sun.aureole) = (0.0, 1.0, 0.0);
     (scenario.camera.blur_px, scenario.camera.samples_per_axis) = (0.0, 8);
     let mut world = World::new(&scenario);
-    // Without contact shadows, which lie beside the silhouettes.
+    // Without contact shadows, which are beside the silhouettes.
     std::sync::Arc::make_mut(&mut world.scenery).openness =
         crate::light::openness::Openness::new(&[], [0.0, 1.0], [0.0, 1.0]);
     (scenario, world)
 }
 
-/// The part of a pixel that shows rock, from 16 × 16 exact rays.
+/// The fraction of a pixel that shows rock, from 16 × 16 exact rays.
 fn rock_part(world: &World, camera: &Camera, x: f64, y: f64) -> f64 {
     let rays = (0..256).filter_map(|k| {
         let (u, v) = ((f64::from(k % 16) + 0.5) / 16.0 - 0.5, (f64::from(k / 16) + 0.5) / 16.0 - 0.5);
@@ -144,7 +144,7 @@ fn rock_part(world: &World, camera: &Camera, x: f64, y: f64) -> f64 {
     hits.iter().filter(|rock| **rock).count() as f64 / hits.len().max(1) as f64
 }
 
-/// How far (px) the silhouettes of rendered windows lie from where exact rays of their cameras put them.
+/// Offset (px) of the silhouettes in rendered windows from those of exact rays of their cameras.
 ///
 /// Least squares: radiance = a + b part + c ∂part/∂x + d ∂part/∂y; a shift of s px gives c = −b s.
 fn silhouette_shift((scenario, world): &(Scenario, World), windows: &[(Camera, Region)]) -> [f64; 2] {
@@ -178,7 +178,7 @@ fn silhouettes_lie_where_exact_rays_of_the_camera_model_put_them() {
     assert!(shift.iter().all(|s| s.abs() < 0.005), "{shift:?}");
 }
 
-/// The cameras of a rig in the site, with the rover at a stop of the demonstration and the mast at its target.
+/// The cameras of a rig in the site frame, with the rover at a stop of the demonstration and the mast at its target.
 fn rig_in_site(rig: CameraRig, image_size: u32, stop: usize) -> (Camera, Camera) {
     let mut settings = demo().scenario.camera.clone();
     (settings.rig, settings.image_size) = (rig, image_size);
@@ -189,7 +189,7 @@ fn rig_in_site(rig: CameraRig, image_size: u32, stop: usize) -> (Camera, Camera)
     (left.moved(&site_from_rover), right.moved(&site_from_rover))
 }
 
-/// The window of 60 × 60 px, without sky, in which rock and ground share the pixels most evenly.
+/// The window of 60 × 60 px, without sky, with the most equal numbers of rock and ground pixels.
 fn window_with_most_rock(world: &World, camera: &Camera) -> Region {
     let evenness = |window: &Region| {
         let pixels = (0..225).map(|k| (window.x + 4 * (k % 15), window.y + 4 * (k / 15)));
@@ -237,11 +237,11 @@ fn sky_that_enters_the_frame_darkens_the_target_unless_a_subframe_is_metered() {
     // An optical depth of 1 with the sun at 45° (domain.md 11.1).
     scenario.sun.diffuse_fraction = 0.66;
     (scenario.camera.samples_per_axis, scenario.camera.auto_exposure.subframe_px) = (1, 21);
-    // Its pattern belongs to the place in the frame, which is another one in each of them.
+    // The flat-field pattern depends on the position in the frame, which differs between the frames.
     scenario.camera.flat_field_residue = 0.0;
     let world = World::new(&scenario);
     let (camera, _) = rig_in_site(CameraRig::MerNavcam, 128, 0);
-    // The part of a frame that shows sky, and the mean number (DN) of the 21 × 21 px around the target.
+    // The fraction of a frame that shows sky, and the mean DN of the 21 × 21 px around the target.
     let frame = |side: u32, mode: ExposureMode| {
         let mut scenario = scenario.clone();
         scenario.camera.exposure = mode;
@@ -260,7 +260,7 @@ fn sky_that_enters_the_frame_darkens_the_target_unless_a_subframe_is_metered() {
     let of_mode = |mode: ExposureMode| [36, 60, 90, 128].map(|side| frame(side, mode));
     let (full, sub) = (of_mode(ExposureMode::FullFrame), of_mode(ExposureMode::Subframe));
     assert!(full[0].0 == 0.0 && full[3].0 > 0.25, "{full:?}");
-    // From 1514 DN without sky to 643 DN with 10, 23 and 31 % of it: the target gets 58 % darker.
+    // From 1514 DN without sky to 643 DN with 10, 23 and 31 % of sky: the target gets 58 % darker.
     assert!(full[1..].iter().all(|(_, dn)| dn / full[0].1 < 0.6), "{full:?}");
     assert!(sub.iter().all(|(_, dn)| (dn / sub[0].1 - 1.0).abs() < 1e-3), "{sub:?}");
 }
@@ -294,7 +294,7 @@ fn a_region_has_the_bits_of_the_whole_picture() {
     let big = Region { x: 400, y: 500, width: 90, height: 70 };
     let small = Region { x: 423, y: 517, width: 31, height: 29 };
     let seed = NoiseSeed { step: 12, eye: Eye::Right };
-    // With fewer samples a pixel, other neighbours share the rays that are cast at once.
+    // With fewer samples a pixel, different neighbours share the rays that are cast at once.
     for samples_per_axis in [1, 2, 4] {
         let mut scenario = demo.scenario.clone();
         scenario.camera.samples_per_axis = samples_per_axis;

@@ -1,4 +1,4 @@
-//! Slip and the pose estimate: slip shows where it should and nowhere else, and sensors err as stated.
+//! Slip and the pose estimate: slip acts only where it should, and sensors have their stated errors.
 
 use super::courses::{close, moves, yaw_deg};
 use crate::camera::rig::Rig;
@@ -12,7 +12,7 @@ use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::Point3;
 use sightline_geometry::odometry_error::OdometryError;
 
-/// Errors of nothing.
+/// An odometry error model without errors.
 const NO_ERROR: OdometryError =
     OdometryError { along_fraction: 0.0, across_fraction: 0.0, attitude_deg: 0.0 };
 
@@ -36,7 +36,7 @@ fn on_plane(
 
 #[test]
 fn blind_moves_fall_short_uphill_and_an_approach_turns_its_wheels_more() {
-    // 15° uphill along x (z points down) in loose sand: 45 % of slip.
+    // 15° uphill along x (z points down) in loose sand: slip ratio 45 %.
     let slope = -15f64.to_radians().tan();
     let sand = RoverSettings { soil: Soil::LooseSand, slip_scale: 1.0, ..RoverSettings::default() };
     let blind = moves(8.0, 0.0, 0.0, &[Move::Forward { distance_m: 1.0, stops: 1 }]);
@@ -52,7 +52,7 @@ fn blind_moves_fall_short_uphill_and_an_approach_turns_its_wheels_more() {
     close(drive.legs[0].driven_m * 0.55, way.norm(), 1e-6);
     let firm = on_plane(&exact, &RoverSettings::default(), slope).unwrap();
     assert_eq!(firm.stops, drive.stops);
-    // Where everything slips the rover does not arrive.
+    // With too much slip the rover does not arrive.
     let steep = on_plane(&exact, &sand, -25f64.to_radians().tan());
     assert!(steep.expect_err("too steep").to_string().contains("rover.slip_scale"));
 }
@@ -71,7 +71,7 @@ fn with_all_slipping_the_estimate_advances_and_the_truth_does_not() {
     // Commanded: 10 · 0.9 less 10 · 0.81, and so on.
     close(seen[2] - seen[1], 0.9, 1e-9);
     close(seen[3] - seen[2], 0.81, 1e-9);
-    // Half of a motion slips, and the next brings the rover to where it should be.
+    // With a slip ratio of one half, the next motion brings the rover to its planned place.
     let half =
         RoverSettings { forced_slip: vec![ForcedSlip { stop: 2, slip: 0.5 }], ..RoverSettings::default() };
     let half = on_plane(&settings, &half, 0.0).unwrap();
@@ -99,7 +99,7 @@ fn a_stuck_rover_makes_no_blind_move_either() {
     for (stop, advance_m) in [(1, 0.6), (2, 0.6), (3, 0.6)] {
         assert_eq!(drive.stops[stop], drive.stops[0]);
         close(believed[stop].translation.x - believed[0].translation.x, advance_m, 1e-9);
-        // The gyro knows that the rover did not turn.
+        // The gyro measures that the rover did not turn.
         close(yaw_deg(&believed[stop]), 0.0, 1e-9);
     }
     assert!(drive.legs.iter().all(|leg| leg.duration_s > 5.0));
@@ -163,7 +163,7 @@ fn wheels_and_imu_have_the_errors_of_their_sensors() {
         pitch += tilt.to_degrees().powi(2);
     }
     let rms = |sum: f64| (sum / SEEDS as f64).sqrt();
-    // 4000 draws know a standard deviation to 1.1 %; three of these are allowed.
+    // 4000 draws determine a standard deviation to 1.1 %; three times this is allowed.
     close(rms(along) / 0.03, 1.0, 0.034);
     close(rms(across) / 0.015, 1.0, 0.034);
     // 80 s of driving: 0.1°/√h · sqrt(80/3600).

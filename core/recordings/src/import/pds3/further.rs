@@ -1,8 +1,8 @@
-//! Pictures of other cameras that were taken where the rover stood at a stop: the stop's further cameras.
+//! Images of other cameras, taken at the rover position of a stop: the stop's further cameras.
 //!
-//! A picture belongs to the stop with its SITE and DRIVE that is next in time. Left and right eye of one moment are a pair with
-//! the name of their family (`front_hazcam`); any other picture is a single camera with the name of its instrument
-//! (`front_hazcam_left`). Of several with one name, that next in time to the stop is taken.
+//! An image belongs to the stop with its SITE and DRIVE that is nearest in time. Left and right image of one moment
+//! are a pair with the name of their camera family (`front_hazcam`); any other image is a single camera with the name
+//! of its instrument (`front_hazcam_left`). Of several with the same name, the one nearest in time to the stop is used.
 
 use std::sync::Arc;
 
@@ -26,7 +26,7 @@ impl Further {
     }
 }
 
-/// The further cameras of each stop, from pictures that no stop uses.
+/// The further cameras of each stop, from images that no stop uses.
 pub(super) fn further(stops: &[Pair], unused: &[Arc<Frame>]) -> Vec<Vec<Further>> {
     let of_stop = |number: usize| {
         let own = unused.iter().filter(|frame| stop_of(stops, frame) == Some(number));
@@ -35,7 +35,7 @@ pub(super) fn further(stops: &[Pair], unused: &[Arc<Frame>]) -> Vec<Vec<Further>
     (0..stops.len()).map(of_stop).collect()
 }
 
-/// The stop to which a picture of another camera belongs.
+/// The stop to which an image of another camera belongs.
 fn stop_of(stops: &[Pair], frame: &Frame) -> Option<usize> {
     let here = stops
         .iter()
@@ -44,7 +44,7 @@ fn stop_of(stops: &[Pair], frame: &Frame) -> Option<usize> {
     here.min_by(|(_, a), (_, b)| apart_s(frame, a).total_cmp(&apart_s(frame, b))).map(|(number, _)| number)
 }
 
-/// Time between a picture and the left one of a stop, s; infinite without clocks.
+/// Time between an image and the left one of a stop, s; infinite without clocks.
 fn apart_s(frame: &Frame, stop: &Pair) -> f64 {
     let clocks = frame.product.clock_s().zip(stop.left.product.clock_s());
     clocks.map_or(f64::INFINITY, |(a, b)| (a - b).abs())

@@ -1,17 +1,17 @@
-//! PDS3 pictures of Mars rovers (MER, MSL) as stereo stops.
+//! PDS3 images of Mars rovers (MER, MSL) as stereo stops.
 //!
-//! Source: domain.md 6.1, 6.3; labels of real products. A picture is taken when its label has a camera model
-//! and a rover pose ([`Product`]); its pixels ([`Raster`]) become a 16-bit PNG with the same numbers, and full
-//! scale is the detector's (4095 for twelve bits). Reals are stretched to 65535 at the largest sample.
+//! Source: domain.md 6.1, 6.3; labels of real products. An image is imported if its label has a camera model and a
+//! rover pose ([`Product`]); its pixels ([`Raster`]) become a 16-bit PNG with the same numbers, and full scale is the
+//! detector's (4095 for twelve bits). Reals are scaled so that the largest sample is 65535.
 //!
-//! A folder's pictures are put together to stops (`pairs`): left and right eye of one moment where there are
-//! such (lateral), otherwise two views of one camera from one rover position (convergent). A single file
-//! stands for the stop that it belongs to; [`ImportOptions::files`] chooses the pictures instead. Pictures of other cameras from the
-//! same rover position become further cameras of the stop (`further`), but not beside chosen files.
+//! A folder's images are combined to stops (`pairs`): left and right image of one moment if there are such (lateral),
+//! otherwise two views of one camera from one rover position (convergent). A single file selects the stop to which it
+//! belongs; [`ImportOptions::files`] chooses the images instead. Images of other cameras from the same rover position
+//! become further cameras of the stop (`further`), but not with chosen files.
 //!
-//! Poses are those of the labels, in their site frame; all stops must be of one site, because labels do not
-//! relate sites. Where the two labels of a stop differ in pose (the rover settled between), the second camera
-//! is carried into the first's rover frame. There is no truth.
+//! Poses are those of the labels, in their site frame; all stops must be of one site, because labels do not relate
+//! sites. If the two labels of a stop differ in pose (the rover settled between), the second camera is transformed
+//! into the first one's rover frame. There is no truth.
 
 mod further;
 mod pairs;
@@ -75,7 +75,7 @@ impl ImportFormat for Pds3 {
         for (step, pair) in pairs.iter().enumerate() {
             let clock = pair.left.product.clock_s().zip(first_clock);
             stops.push(Stop {
-                // Without clocks the stops are one second apart: only their order is known.
+                // Without clocks only the order is known: the stops are one second apart.
                 time_s: clock.map_or(step as f64, |(clock, first)| clock - first),
                 site_from_rover: pair.left.pose,
                 mast_angles: None,
@@ -107,15 +107,15 @@ impl ImportFormat for Pds3 {
     }
 }
 
-/// The pictures of an import.
+/// The images of an import.
 struct Chosen {
     pairs: Vec<Pair>,
-    /// Of each pair; empty where the pictures were chosen by hand.
+    /// The further cameras of each pair; empty if the user chose the images.
     further: Vec<Vec<Further>>,
     stereo: StereoGeometry,
 }
 
-/// The pictures of all stops.
+/// The images of all stops.
 fn all_frames<'a>(pairs: &'a [Pair], further: &'a [Vec<Further>]) -> impl Iterator<Item = &'a Frame> {
     let of_pairs = pairs.iter().flat_map(|pair| [&pair.left, &pair.right]);
     let of_further =
@@ -123,7 +123,7 @@ fn all_frames<'a>(pairs: &'a [Pair], further: &'a [Vec<Further>]) -> impl Iterat
     of_pairs.chain(of_further).map(AsRef::as_ref)
 }
 
-/// Writes the pictures of a stop's further cameras, the models carried into the rover frame of the stop.
+/// Writes the images of a stop's further cameras, with the models transformed into the rover frame of the stop.
 fn write_further(
     stop: &Pair,
     cameras: &[Further],
@@ -172,7 +172,7 @@ fn product_files(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// The stops of a folder, or the one that a file belongs to.
+/// The stops of a folder, or the one to which a file belongs.
 fn choose(path: &Path, output: &mut Output<'_>) -> Result<Chosen> {
     let mut frames: Vec<Arc<Frame>> = Vec::new();
     for file in product_files(folder_of(path))? {
@@ -205,7 +205,7 @@ fn choose(path: &Path, output: &mut Output<'_>) -> Result<Chosen> {
     Ok(Chosen { pairs, further, stereo })
 }
 
-/// The stops of the files that the person named, left and right in turn.
+/// The stops of the files named by the user, left and right alternately.
 fn chosen_by_hand(path: &Path, options: &ImportOptions, output: &mut Output<'_>) -> Result<Chosen> {
     if !options.files.len().is_multiple_of(2) {
         let count = options.files.len();
@@ -225,7 +225,7 @@ fn chosen_by_hand(path: &Path, options: &ImportOptions, output: &mut Output<'_>)
     Ok(Chosen { pairs, further: Vec::new(), stereo })
 }
 
-/// Refuses stops whose poses are in different frames.
+/// Rejects stops whose poses are in different frames.
 fn one_site(pairs: &[Pair]) -> Result<()> {
     let mut sites =
         pairs.iter().flat_map(|pair| [&pair.left, &pair.right]).map(|frame| (frame, frame.site()));
@@ -238,15 +238,15 @@ fn one_site(pairs: &[Pair]) -> Result<()> {
     }
 }
 
-/// How detector numbers become those of a PNG.
+/// The conversion of detector numbers to those of a PNG.
 struct Scale {
-    /// PNG number of one detector number.
+    /// PNG number per detector number.
     factor: f64,
     full_scale_dn: f64,
 }
 
 impl Scale {
-    /// The same scale for all pictures, so that their brightness can be compared.
+    /// The same scale for all images, so that their brightness can be compared.
     fn of(frames: &[&Frame], output: &Output<'_>) -> Result<Self> {
         if output.is_dry() {
             return Ok(Self { factor: 1.0, full_scale_dn: PNG_LIMIT_DN });
@@ -267,7 +267,7 @@ impl Scale {
     }
 }
 
-/// Writes the picture of a frame as PNG, named after its product.
+/// Writes the image of a frame as PNG, named after its product.
 fn write_view(frame: &Frame, camera: Camera, scale: &Scale, output: &mut Output<'_>) -> Result<View> {
     let name = format!("{}.png", file_name(&frame.product.id()));
     if output.is_dry() {
@@ -287,7 +287,7 @@ fn write_view(frame: &Frame, camera: Camera, scale: &Scale, output: &mut Output<
     Ok(View { image: name, camera: CameraSource::Inline(camera) })
 }
 
-/// A product's name as the name of a file.
+/// Converts a product's name to the name of a file.
 fn file_name(id: &str) -> String {
     id.chars().map(|c| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect()
 }

@@ -1,11 +1,11 @@
-//! Which pictures make a stop.
+//! Combines images to stops.
 //!
-//! Two pictures belong together when camera family, size, projection and processing are the same, and
+//! Two images belong together if camera family, size, projection and processing are the same, and
 //!
-//! - *lateral*: one is of the left eye, one of the right, their motion counters are equal and their clocks
-//!   differ by at most 2 s (domain.md 6.3);
-//! - *convergent*: both are of one camera, SITE and DRIVE are equal (the rover stood still, domain.md 1.6),
-//!   the camera points elsewhere, and the views overlap. They are paired in the order of their clocks.
+//! - *lateral*: one is of the left camera, one of the right, their motion counters are equal and their clocks differ
+//!   by at most 2 s (domain.md 6.3);
+//! - *convergent*: both are of one camera, SITE and DRIVE are equal (the rover did not move, domain.md 1.6), the
+//!   pointing differs, and the views overlap. They are paired in the order of their clocks.
 //!
 //! Lateral pairs are preferred; all stops of a traverse are of the same camera family, the one with the most
 //! stops.
@@ -18,11 +18,11 @@ use sightline_geometry::error::Result;
 use sightline_geometry::frames::{Pixel, PoseRecord};
 use sightline_geometry::stereo_geometry::StereoGeometry;
 
-/// Greatest difference of the clocks of a left and a right picture of one moment, s.
+/// Largest difference of the clocks of a left and a right image of one moment, s.
 const SAME_MOMENT_S: f64 = 2.0;
-/// Places along each side of the image at which the overlap of two views is sought.
+/// Number of positions along each side of the image at which the overlap of two views is tested.
 const OVERLAP_GRID: u32 = 9;
-/// Ranges at which it is sought, m.
+/// Ranges at which it is tested, m.
 const OVERLAP_RANGES_M: [f64; 4] = [1.0, 3.0, 10.0, 30.0];
 
 /// A product that can be one view of a stop.
@@ -44,7 +44,7 @@ impl Frame {
         Ok(Self { product, camera, pose })
     }
 
-    /// The site that the pose refers to, where the label tells.
+    /// The site of the pose; `None` if the label lacks it.
     pub(super) fn site(&self) -> Option<f64> {
         self.product.motion_counter().map(|counter| counter[0])
     }
@@ -57,13 +57,13 @@ impl Frame {
         }
     }
 
-    /// The camera's name without its eye: `NAVCAM` for `NAVCAM_LEFT`, `NAV_B` for `NAV_LEFT_B`.
+    /// The camera's name without its side: `NAVCAM` for `NAVCAM_LEFT`, `NAV_B` for `NAV_LEFT_B`.
     pub(super) fn family(&self) -> String {
         let parts = self.product.instrument().split('_');
         parts.filter(|part| !matches!(*part, "LEFT" | "RIGHT")).collect::<Vec<_>>().join("_")
     }
 
-    /// Whether both pictures could be views of one stop, by camera family and processing.
+    /// Whether both images could be views of one stop, by camera family and processing.
     fn is_alike(&self, other: &Self) -> bool {
         let text = |frame: &Self, key: &str| frame.product.label.text(key).map(str::to_owned);
         let same = |key: &str| text(self, key) == text(other, key);
@@ -118,7 +118,7 @@ impl Pair {
         self.camera_in_left_rover(&self.right)
     }
 
-    /// The camera of a picture in the rover frame of the first one; the rover may have settled between.
+    /// The camera of an image in the rover frame of the first one; the rover may have settled between.
     pub(super) fn camera_in_left_rover(&self, frame: &Frame) -> Camera {
         if self.left.pose == frame.pose {
             return frame.camera.clone();
@@ -127,7 +127,7 @@ impl Pair {
         frame.camera.moved(&(left_rover_from_site * frame.pose.to_pose()))
     }
 
-    /// Whether any point of the first view, at a usual range, is seen in the second.
+    /// Whether any point of the first view, at a typical range, is visible in the second.
     fn overlaps(&self) -> bool {
         let (left, right) = (&self.left.camera, self.right_camera_in_left_rover());
         let place =
@@ -141,11 +141,11 @@ impl Pair {
     }
 }
 
-/// The stops that the pictures make, in the order of their clocks.
+/// The stops formed by the images, in the order of their clocks.
 pub(super) fn assemble(frames: &[Arc<Frame>]) -> (Vec<Pair>, StereoGeometry) {
     let mut frames = frames.to_vec();
     let clock = |frame: &Frame| frame.product.clock_s().unwrap_or(f64::INFINITY);
-    // The sort is stable: pictures without a clock stay in the order of their names.
+    // The sort is stable: images without a clock stay in the order of their names.
     frames.sort_by(|a, b| clock(a).total_cmp(&clock(b)));
     let lateral = largest_family(pair_up(&frames, Pair::is_lateral));
     if lateral.is_empty() {
@@ -154,7 +154,7 @@ pub(super) fn assemble(frames: &[Arc<Frame>]) -> (Vec<Pair>, StereoGeometry) {
     (lateral, StereoGeometry::Lateral)
 }
 
-/// Pairs each picture with the nearest later or earlier one that fits; no picture is used twice.
+/// Pairs each image with the nearest later or earlier one that fits; no image is used twice.
 pub(super) fn pair_up(frames: &[Arc<Frame>], fits: impl Fn(&Pair) -> bool) -> Vec<Pair> {
     let mut used = vec![false; frames.len()];
     let mut pairs = Vec::new();
@@ -177,7 +177,7 @@ pub(super) fn pair_up(frames: &[Arc<Frame>], fits: impl Fn(&Pair) -> bool) -> Ve
     pairs
 }
 
-/// The pairs of the camera family that has the most; the first such family where several have.
+/// The pairs of the camera family that has the most; the first such family if several have as many.
 fn largest_family(pairs: Vec<Pair>) -> Vec<Pair> {
     let count = |family: &str| pairs.iter().filter(|pair| pair.left.family() == family).count();
     let mut best: Option<(String, usize)> = None;

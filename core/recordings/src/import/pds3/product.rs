@@ -1,4 +1,4 @@
-//! One PDS3 product: what its label says about the camera, the rover and the picture.
+//! One PDS3 product: the data of its label on the camera, the rover and the image.
 //!
 //! Source: domain.md 1.4, 1.6, 2.4, 6.1, 6.3; labels of MER and MSL products. Group names are matched by
 //! their beginning, because MSL and later missions write `…_PARMS` or shorten them. A camera model that
@@ -19,19 +19,19 @@ use sightline_world::traverse::StopLight;
 pub(crate) const FILE_LIMIT: u64 = 256 << 20;
 /// The largest label that is read, bytes.
 const LABEL_LIMIT: u64 = 1 << 20;
-/// The largest number of lines or samples of a picture.
+/// The largest number of lines or samples of an image.
 pub(crate) const SIZE_LIMIT: u32 = 16_384;
 
-/// A product, known by its label; its pixels are read by `raster`.
+/// A product, represented by its label; its pixels are read by `raster`.
 #[derive(Clone, Debug)]
 pub struct Product {
-    /// The file with the label: the picture itself, or a detached label beside it.
+    /// The file with the label: the image itself, or a detached label beside it.
     pub path: PathBuf,
     /// The label.
     pub label: Group,
 }
 
-/// Whether the file begins like a PDS3 product.
+/// Whether the file begins as a PDS3 product does.
 pub fn is_product(path: &Path) -> bool {
     let mut head = Vec::new();
     let read = open_regular(path).and_then(|file| file.take(512).read_to_end(&mut head));
@@ -66,18 +66,18 @@ impl Product {
         Error::format(&self.path, problem)
     }
 
-    /// The product's name: its `PRODUCT_ID`, or the file's name where the label has none.
+    /// The product's name: its `PRODUCT_ID`, or the file's name if the label has none.
     pub fn id(&self) -> String {
         let stem = || self.path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
         self.label.text("PRODUCT_ID").map(str::to_owned).or_else(stem).unwrap_or_default()
     }
 
-    /// The instrument, for example `NAVCAM_LEFT`; empty where the label does not say.
+    /// The instrument, for example `NAVCAM_LEFT`; empty if the label lacks it.
     pub fn instrument(&self) -> &str {
         self.label.text("INSTRUMENT_ID").unwrap_or_default()
     }
 
-    /// The rover motion counter (SITE, DRIVE, …), where the label has at least these two.
+    /// The rover motion counter (SITE, DRIVE, …), if the label has at least these two.
     pub(crate) fn motion_counter(&self) -> Option<Vec<f64>> {
         self.label.numbers("ROVER_MOTION_COUNTER").filter(|counter| counter.len() >= 2)
     }
@@ -85,11 +85,11 @@ impl Product {
     /// The spacecraft clock at the start of the exposure, s.
     pub(crate) fn clock_s(&self) -> Option<f64> {
         let text = self.label.text("SPACECRAFT_CLOCK_START_COUNT")?;
-        // A clock partition may stand before a slash.
+        // A clock partition may precede a slash.
         text.rsplit('/').next()?.trim().parse().ok().filter(|clock: &f64| clock.is_finite())
     }
 
-    /// Width and height of the picture, px.
+    /// Width and height of the image, px.
     ///
     /// # Errors
     /// No `IMAGE` object, or a size of 0 or beyond `SIZE_LIMIT`.
@@ -118,19 +118,20 @@ impl Product {
         image.ok_or_else(|| self.problem("the label describes no IMAGE; choose a product with a picture"))
     }
 
-    /// The camera in the rover frame, with O made unit and the size of the picture.
+    /// The camera in the rover frame, with O made unit and the size of the image.
     ///
     /// # Errors
-    /// No camera model, an implausible one, one of another frame, or a bad picture size.
+    /// No camera model, an implausible one, one of another frame, or a bad image size.
     pub fn camera(&self) -> Result<Camera> {
         let model = camera_model(&self.label).map_err(|problem| self.problem(problem))?;
         let [width, height] = self.size()?;
         Ok(Camera::new(model, width, height))
     }
 
-    /// Sun and exposure, where the label has them.
+    /// Sun and exposure; `None` if the label lacks the sun's direction.
     ///
-    /// Opportunity's labels count the sun's elevation downwards, the others upwards; pictures are taken by day.
+    /// Opportunity's labels count the sun's elevation downwards, the others upwards; images are taken by day, so the
+    /// sign is dropped.
     pub fn light(&self) -> Option<StopLight> {
         let site = self.label.last_group(|name| name.starts_with("SITE_DERIVED_GEOMETRY"))?;
         let state = self.label.last_group(|name| name.starts_with("INSTRUMENT_STATE"));
@@ -175,7 +176,7 @@ pub fn camera_model(label: &Group) -> Result<CameraModel, String> {
         "CAHVORE" => {
             let [kind] = component(group, "T")?;
             let imaging = Imaging::try_from(kind as u8)?;
-            // P has a meaning for the general law only, and older labels leave it out elsewhere.
+            // P is used by the general law only, and older labels omit it otherwise.
             let linearity = match imaging {
                 Imaging::General => component(group, "P")?,
                 Imaging::Perspective | Imaging::Fisheye => [0.0],

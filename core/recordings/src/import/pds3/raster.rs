@@ -5,9 +5,8 @@
 //! `LINE_PREFIX_BYTES`, its samples and `LINE_SUFFIX_BYTES`. Samples are integers of 8, 16 or 32 bits or reals
 //! of 32 bits, in either byte order; one band.
 //!
-//! Full scale is the largest number that `SAMPLE_BIT_MASK` lets through (4095 for twelve bits); some writers
-//! leave out the mask's radix, so a mask that is written with as many binary digits as a sample has bits is
-//! read as binary.
+//! Full scale is the largest number that `SAMPLE_BIT_MASK` allows (4095 for twelve bits). Some writers omit the
+//! mask's radix, so a mask with as many binary digits as a sample has bits is read as binary.
 
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -17,7 +16,7 @@ use crate::import::odl::{Group, Value};
 use sightline_geometry::error::{Error, Result};
 use sightline_vision::image::io::open_regular;
 
-/// The samples of a picture, as the detector's numbers.
+/// The samples of an image, as the detector's numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Raster {
     /// Width, px.
@@ -26,7 +25,7 @@ pub struct Raster {
     pub height: u32,
     /// The samples line by line, DN.
     pub samples: Vec<f32>,
-    /// The largest number of the detector, DN; `None` where the label does not tell (reals).
+    /// The largest number of the detector, DN; `None` if the label lacks it (reals).
     pub full_scale_dn: Option<f64>,
 }
 
@@ -40,7 +39,7 @@ impl Raster {
     }
 }
 
-/// How one sample is stored.
+/// The storage format of a sample.
 #[derive(Clone, Copy)]
 struct SampleFormat {
     bytes: usize,
@@ -116,7 +115,7 @@ impl Product {
     /// Reads the pixels.
     ///
     /// # Errors
-    /// A sentence that names what the label leaves open, or a file that is too short for its picture.
+    /// A sentence that names the missing or unsupported entry of the label, or a file that is too short for its image.
     pub fn read_raster(&self) -> Result<Raster> {
         let image = self.image()?;
         let [width, height] = self.size()?;
@@ -144,7 +143,7 @@ impl Product {
         plausible.then_some(bytes as usize).ok_or_else(|| self.problem(format!("{key} is {bytes}")))
     }
 
-    /// Reads `length` bytes from where `^IMAGE` points.
+    /// Reads `length` bytes from the position given by `^IMAGE`.
     fn read_block(&self, length: usize) -> Result<Vec<u8>> {
         let (path, offset) = self.locate_pixels()?;
         let unreadable = |source| Error::Read { path: path.clone(), source };
@@ -164,7 +163,7 @@ impl Product {
         Ok(bytes)
     }
 
-    /// The file that holds the pixels, and the byte at which they begin.
+    /// The file with the pixels, and the byte at which they begin.
     fn locate_pixels(&self) -> Result<(PathBuf, u64)> {
         let missing = || self.problem("the label has no ^IMAGE, so where its pixels begin is unknown");
         let pointer = self.label.value("^IMAGE").ok_or_else(missing)?;
@@ -212,7 +211,7 @@ impl Product {
         Ok(bytes)
     }
 
-    /// The file of that name in the label's folder, whichever the case of its letters.
+    /// The file of that name in the label's folder, ignoring case.
     fn beside(&self, name: &str) -> Result<PathBuf> {
         let folder = self.path.parent().unwrap_or(&self.path);
         let same_name = |path: &PathBuf| path.file_name().is_some_and(|own| own.eq_ignore_ascii_case(name));

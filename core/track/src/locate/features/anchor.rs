@@ -1,7 +1,7 @@
-//! The stops from which a motion may be measured: where the target was there, and what features they have (R186).
+//! The stops from which a motion can be measured, with the target's position and the features there (R186).
 //!
-//! After an occlusion the stops between are of no use; the last good one is tried again at every stop. Of several
-//! remembered ones the motion is taken that leaves the target most certain, so that fewer motions are chained.
+//! After an occlusion the stops in between are useless, so the last good stop is tried again at every stop. Of
+//! several remembered stops, the one whose motion gives the most certain target is used, so that fewer motions are chained.
 
 use std::sync::Arc;
 
@@ -14,43 +14,43 @@ use sightline_geometry::estimate::carry::carry;
 use sightline_geometry::estimate::motion_parameters::MotionParameters;
 use sightline_geometry::frames::{Point3, Pose};
 
-/// A stop at which the target was found.
+/// A stop at which the target was located.
 ///
-/// Serialised, the features are left out: `detect` finds the same ones again in the images of that stop.
+/// The features are not serialised: `detect` finds the same ones again in the images of that stop.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Anchor {
-    /// The stop, from 0.
+    /// The step, from 0.
     pub step: usize,
-    /// Which stop of the recording it is, where the traverse has a store.
+    /// Index of the stop in the recording; `None` if the traverse has no store.
     pub stop: Option<usize>,
     /// The features and points of that stop.
     #[serde(skip)]
     pub features: Arc<StopFeatures>,
-    /// The estimated pose there.
+    /// The estimated rover pose at that stop.
     pub site_from_rover: Pose,
-    /// Where the target was, in the rover frame of that stop.
+    /// The target's position in the rover frame of that stop.
     pub carried: Carried,
 }
 
-/// A target's position as motions carried it from the designation to a stop.
+/// A target's position, carried by motions from the designation to a stop.
 ///
-/// What the features of one stop share (`feature_common_px`) they share with those of the next, since it is the same stones
-/// that are seen from nearly the same side: it adds up along a run, whereas what scatters from feature to feature adds up in
-/// squares.
+/// Errors shared by the features of one stop (`feature_common_px`) are shared with the next stop as well, because the
+/// same stones are seen from nearly the same side. They add up linearly along a run, whereas independent errors add
+/// up in quadrature.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Carried {
     /// The position, m, rover frame.
     pub position_in_rover: Point3,
-    /// The covariance of the designation and of what scatters, m².
+    /// Covariance of the designation and of the independent errors, m².
     pub scattered: Matrix3<f64>,
-    /// How the shared errors move it, one column each: 1σ, m.
+    /// Displacement by 1σ of each shared error, m, one column each.
     pub shared_m: Matrix3<f64>,
-    /// How the rover frame turned since the designation: takes directions of that into the present one.
+    /// Rotation of the rover frame since the designation: maps directions in the first frame to the current one.
     pub now_from_first: UnitQuaternion<f64>,
 }
 
 impl Carried {
-    /// A designated position.
+    /// Returns the position at the designation.
     pub fn designated(position_in_rover: Point3, covariance_in_rover: Matrix3<f64>) -> Self {
         Self {
             position_in_rover,
@@ -60,9 +60,9 @@ impl Carried {
         }
     }
 
-    /// The position after a motion; `by_shared_error` says how its parameters change with 1σ of each.
+    /// Returns the position after a motion. `by_shared_error`: change of the motion parameters by 1σ of each shared error.
     ///
-    /// None where a covariance is not positive semidefinite.
+    /// Returns `None` if a covariance is not positive semidefinite.
     pub fn after(&self, motion: &Bootstrap, by_shared_error: Option<[Vector6<f64>; 3]>) -> Option<Self> {
         let (theta, point) = (motion.parameters, &self.position_in_rover);
         let (position_in_rover, scattered) = carry(point, &self.scattered, theta, &motion.covariance)?;
@@ -93,7 +93,7 @@ pub struct Anchors {
 }
 
 impl Anchors {
-    /// Adds a stop and forgets all but the newest `count`.
+    /// Adds a stop and drops all but the newest `count`.
     #[must_use]
     pub fn with(mut self, anchor: Anchor, count: usize) -> Self {
         self.stops.push(anchor);

@@ -4,7 +4,7 @@
 //! z_i = (l_iᵀ, r_iᵀ)ᵀ          x_i = f(z_i)                                                     D-Eq 1
 //! P_i = (σ² + (σ_s s_i)²) J Jᵀ,  J = ∂f/∂z    by differences of one pixel
 //! ```
-//! f is the midpoint of the two rays. The left feature's descriptor stands for the point (R160).
+//! f returns the midpoint of the two rays. The point has the descriptor of its left feature (R160).
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
@@ -26,10 +26,10 @@ use sightline_geometry::estimate::triangulate::midpoint;
 use sightline_geometry::frames::{Pixel, Point3, Vector3};
 use sightline_vision::sift::{self, Features, Keypoint};
 
-/// A feature that both eyes see.
+/// A feature that is matched in both images, as a point in space.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
-    /// Which keypoints, of the left and of the right image.
+    /// Indices of the left and the right keypoint.
     pub stereo: StereoMatch,
     /// Position in the rover frame of the stop, m.
     pub position_in_rover: Point3,
@@ -37,11 +37,12 @@ pub struct Point {
     pub covariance_in_rover: Matrix3<f64>,
     /// Distance from the left camera, m.
     pub range_m: f64,
-    /// How it moves when both pixels go right, when both go down, and when the right one alone goes right, m per px.
+    /// Derivative of the position with respect to shifting both pixels right, both down, and the right one alone
+    /// right, m per px.
     pub by_shift_m: [Vector3; 3],
 }
 
-/// What one stop offers: all features of both eyes, and those that became points.
+/// The features of one stop: all of both images, and the triangulated points.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StopFeatures {
     /// Features of the left image.
@@ -50,7 +51,7 @@ pub struct StopFeatures {
     pub right: Features,
     /// The points.
     pub points: Vec<Point>,
-    /// Left features whose partner lies beyond the ranges or not in front of the cameras.
+    /// Number of stereo matches whose range is outside the limits or that are not in front of the cameras.
     pub out_of_range: usize,
 }
 
@@ -62,12 +63,12 @@ impl HeapBytes for StopFeatures {
 }
 
 impl StopFeatures {
-    /// Where a keypoint lies.
+    /// Returns the position of a keypoint, px.
     pub fn pixel(keypoint: &Keypoint) -> Pixel {
         pixel_of(keypoint)
     }
 
-    /// The keypoint of a point in the left image.
+    /// Returns the left keypoint of a point.
     pub fn left_of(&self, point: &Point) -> &Keypoint {
         &self.left.keypoints[point.stereo.left as usize]
     }
@@ -101,7 +102,7 @@ pub fn detect(
     Ok(StopFeatures { left, right, points, out_of_range })
 }
 
-/// The point of a match; none beyond the ranges or behind a camera.
+/// Triangulates a match; `None` outside the range limits or behind a camera.
 fn triangulate(
     stereo: StereoMatch,
     [l, r]: [Pixel; 2],

@@ -24,9 +24,9 @@ pub struct FeatureEvidence {
     pub detect: Option<Detected>,
     /// The remembered stops from which a motion was measured, newest first.
     pub anchors: Vec<AnchorTried>,
-    /// The matches with the chosen one.
+    /// The matches with the chosen stop.
     pub match_features: Option<MatchedFeatures>,
-    /// The motion from it.
+    /// The motion since the chosen stop.
     pub fit_motion: Option<FittedMotion>,
     /// The covariance of that motion by the bootstrap.
     pub bootstrap: Option<Bootstrapped>,
@@ -34,7 +34,7 @@ pub struct FeatureEvidence {
     #[serde(skip)]
     #[schema(ignore)]
     pub stop: Option<usize>,
-    /// The target, carried here by the motions.
+    /// The target's position, carried to this stop by the motions.
     #[serde(skip)]
     #[schema(ignore)]
     pub carried: Option<Carried>,
@@ -46,41 +46,41 @@ pub struct FeatureEvidence {
     #[serde(skip)]
     #[schema(ignore)]
     pub table: Unsent<Table>,
-    /// One row per bootstrap set: the target's position.
+    /// One row per bootstrap set: the target's position and pixel, in [`CLOUD_COLUMNS`] columns.
     #[serde(skip)]
     #[schema(ignore)]
     pub cloud: Unsent<Table>,
 }
 
-/// Counts of step `detect` and of the matches between the eyes.
+/// Counts of step `detect`, with the stereo matches.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Detected {
     /// Features of the left image.
     pub left: usize,
     /// Features of the right image.
     pub right: usize,
-    /// Features with a partner in the other eye.
+    /// Number of features matched in the other image.
     pub stereo_matches: usize,
-    /// Those of them that became points.
+    /// Number of these with a triangulated point.
     pub points: usize,
-    /// Median distance of the points from the left camera, m; null without any.
+    /// Median distance of the points from the left camera, m; null without points.
     pub median_range_m: Option<f64>,
 }
 
 /// The motion from one remembered stop.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct AnchorTried {
-    /// The stop.
+    /// The step of the remembered stop.
     pub step: usize,
-    /// Matched points.
+    /// Number of matched points.
     pub matches: usize,
     /// Number of inliers of the motion.
     pub inliers: usize,
-    /// The confidence of that number of inliers.
+    /// Confidence from the number of inliers, 0 to 1.
     pub confidence: f64,
-    /// Largest 1σ axis of the target's position by this motion, m; null without one.
+    /// Largest 1σ axis of the target's position after this motion, m; null without a motion.
     pub sigma_m: Option<f64>,
-    /// Why there is no motion, as one sentence.
+    /// Why there is no motion, as one sentence; null if there is one.
     pub missing: Option<String>,
     /// Whether the target is located from this stop.
     pub chosen: bool,
@@ -89,13 +89,13 @@ pub struct AnchorTried {
 /// The matches with the features of an earlier stop.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct MatchedFeatures {
-    /// The earlier stop.
+    /// The step of the earlier stop.
     pub from_step: usize,
-    /// Its points.
+    /// Number of points of the earlier stop.
     pub then: usize,
-    /// The points of this stop.
+    /// Number of points of this stop.
     pub now: usize,
-    /// Matches of the two.
+    /// Number of matches between the two stops.
     pub matches: usize,
     /// Whether the prior was dropped because too few matches were consistent with the pose estimates.
     #[serde(default)]
@@ -105,9 +105,9 @@ pub struct MatchedFeatures {
 /// The rigid motion since the earlier stop.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct FittedMotion {
-    /// Translation: the earlier rover frame's origin in the present one, m.
+    /// Translation: the earlier rover frame's origin in the current one, m.
     pub translation_m: [f64; 3],
-    /// Roll, pitch and yaw, deg.
+    /// Rotation from the earlier rover frame to the current one: roll, pitch and yaw, deg.
     pub roll_pitch_yaw_deg: [f64; 3],
     /// Number of inliers.
     pub inliers: usize,
@@ -136,7 +136,7 @@ impl FittedMotion {
 pub struct Bootstrapped {
     /// Number of bootstrap sets.
     pub sets: usize,
-    /// Of translation (m) and roll, pitch, yaw (rad).
+    /// Covariance of translation (m) and roll, pitch, yaw (rad).
     #[schema(value_type = Vec<f64>)]
     pub covariance: SMatrix<f64, 6, 6>,
     /// 1σ of each coordinate of the translation, m.
@@ -150,7 +150,7 @@ pub struct Bootstrapped {
 pub struct Table {
     /// Number of columns.
     pub columns: u32,
-    /// All rows; NaN where a number does not exist.
+    /// All rows; NaN for a missing number.
     pub values: Vec<f32>,
 }
 
@@ -166,28 +166,28 @@ pub enum FeatureColumn {
     Sigma,
     /// Its orientation, rad, clockwise on screen from +x.
     Orientation,
-    /// Column of its partner in the right image, px.
+    /// Column of its match in the right image, px.
     RightX,
     /// Its row, px.
     RightY,
     /// Distance from the left camera, m.
     Range,
-    /// Column in the left image of the earlier stop, px.
+    /// Column of its match in the left image of the earlier stop, px.
     ThenX,
     /// Its row, px.
     ThenY,
-    /// Where the motion puts the earlier point in the left image, px.
+    /// Column of the earlier point, moved by the motion, in the current left image, px.
     MovedX,
     /// Its row, px.
     MovedY,
-    /// Distance of the two points under the motion, m.
+    /// Distance between the two points after the motion, m.
     Residual,
-    /// 1 where the match agrees with the motion, 0 where not.
+    /// 1 for an inlier of the motion, 0 for an outlier.
     Inlier,
 }
 
 impl FeatureColumn {
-    /// How many there are.
+    /// Number of columns.
     pub const COUNT: usize = Self::Inlier as usize + 1;
 }
 
@@ -291,7 +291,7 @@ impl Record for Bootstrapped {
     }
 }
 
-/// The arrays of this stage that panels draw by themselves.
+/// Names of the arrays of this stage that a panel draws individually.
 impl ArrayName {
     /// The features of the left image: a row each, with the columns of [`FeatureColumn`].
     pub const FEATURES: Self = Self::new("features");

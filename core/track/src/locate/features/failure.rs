@@ -6,10 +6,10 @@ pub enum FeatureFailure {
     /// Settings contradict each other.
     #[error("{0}")]
     Settings(String),
-    /// The result is not wanted any more; it is discarded.
+    /// The step was cancelled; its result is discarded.
     #[error("the step was cancelled")]
     Cancelled,
-    /// The memory is empty.
+    /// No stop is remembered.
     #[error("no earlier stop with features is remembered")]
     NoAnchor,
     /// No remembered stop gives a motion.

@@ -1,8 +1,8 @@
-//! Step `match_features` from the left eye to the right: the nearest descriptor (R158), of all or along the epipolar curve.
+//! Stereo part of step `match_features`: the nearest descriptor (R158), among all features or along the epipolar curve.
 //!
-//! The curve of a left feature is the projection of its ray, sampled at equal steps of inverse range; between samples it is
-//! taken as straight. Only right features within the tolerance of it are compared, so that the constrained search is also
-//! the quicker one. Ratio test and mutual test then hold among those.
+//! The curve of a left feature is the projection of its ray, sampled at equal steps of inverse range and interpolated
+//! linearly. Only right features within the tolerance of the curve are compared, so that the constrained search is
+//! also the faster one. Ratio test and mutual test then apply to these candidates.
 
 use super::settings::FeatureSettings;
 use sightline_geometry::camera::Camera;
@@ -10,13 +10,13 @@ use sightline_geometry::frames::Pixel;
 use sightline_vision::sift::matching::{self, MatchSettings};
 use sightline_vision::sift::{Descriptor, Features, Keypoint};
 
-/// Samples of a curve: an octave of ranges of a real pair bends by less than a tenth of a pixel between two.
+/// Number of samples of a curve: over an octave of ranges, a curve of a real pair bends by less than 0.1 px between two.
 const SAMPLES: usize = 17;
 
-/// Rows of a bucket, px.
+/// Height of a bucket, px.
 const BUCKET_PX: f64 = 8.0;
 
-/// A left and a right feature that look alike.
+/// A left and a right feature with similar descriptors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StereoMatch {
     /// Index of the left feature.
@@ -32,7 +32,7 @@ pub(super) fn pixel_of(keypoint: &Keypoint) -> Pixel {
     Pixel::new(f64::from(keypoint.x), f64::from(keypoint.y))
 }
 
-/// Matches the features of two eyes.
+/// Matches the features of the left and the right image.
 pub(super) fn match_stereo(
     left: &Features,
     right: &Features,
@@ -55,7 +55,7 @@ pub(super) fn match_stereo(
     nearest.matches(&settings.matching())
 }
 
-/// The visible samples of the epipolar curve of a left pixel; none when fewer than two are.
+/// The visible samples of the epipolar curve of a left pixel; `None` if fewer than two are visible.
 fn curve(pixel: Pixel, [left, right]: [&Camera; 2], settings: &FeatureSettings) -> Option<Vec<Pixel>> {
     let ray = left.ray(pixel)?;
     let (far, near) = (1.0 / settings.feature_range_max_m, 1.0 / settings.feature_range_min_m);
@@ -64,7 +64,7 @@ fn curve(pixel: Pixel, [left, right]: [&Camera; 2], settings: &FeatureSettings) 
     (pixels.len() >= 2).then_some(pixels)
 }
 
-/// Right features by their row.
+/// The right features, bucketed by row.
 struct Buckets<'a> {
     features: &'a Features,
     rows: Vec<Vec<u32>>,
@@ -83,7 +83,7 @@ impl<'a> Buckets<'a> {
         Self { features, rows }
     }
 
-    /// Features within a distance of a polyline, each once, in the order of their index.
+    /// Returns the features within a distance of a polyline, each once, by ascending index.
     fn near(&self, curve: &[Pixel], tolerance_px: f64) -> Vec<u32> {
         let mut found = Vec::new();
         for ends in curve.windows(2) {
@@ -109,7 +109,7 @@ impl<'a> Buckets<'a> {
     }
 }
 
-/// Distance of a pixel from the line between two others, px.
+/// Distance of a pixel from the segment between two others, px.
 fn distance_to_segment(p: Pixel, a: Pixel, b: Pixel) -> f64 {
     let (dx, dy) = (b.x - a.x, b.y - a.y);
     let length2 = dx * dx + dy * dy;
@@ -118,11 +118,11 @@ fn distance_to_segment(p: Pixel, a: Pixel, b: Pixel) -> f64 {
     p.distance(a.offset(along * dx, along * dy))
 }
 
-/// The nearest partner of every left feature, and of every right one.
+/// The nearest neighbour of every left feature, and of every right one.
 struct Nearest {
-    /// Left feature, its nearest right one, and the squared distances of that and of the second nearest.
+    /// Left feature, its nearest right feature, and the squared distances of the nearest and the second nearest.
     of_left: Vec<(u32, u32, u32, Option<u32>)>,
-    /// For every right feature: squared distance and index of the nearest left one.
+    /// For every right feature: squared distance and index of the nearest left feature.
     of_right: Vec<Option<(u32, u32)>>,
 }
 

@@ -1,20 +1,20 @@
 //! The feature locator: `detect` → `match_features` → `triangulate` → `fit_motion` → `bootstrap` (Deans et al. 2005, D§2).
 //!
-//! The target needs no feature on it (R168): the features of the whole scene give the rigid motion between two stops, and
-//! that moves the target,
+//! No feature needs to be on the target (R168): the features of the whole scene give the rigid motion between two
+//! stops, and that moves the target,
 //! ```text
 //! x_now = T(θ*) x_then                                                                          D-Eq 3
 //! (x, P_xx)_now = unscented transform of T(θ) x over (x, P_xx)_then and (θ*, P_θθ)               D-Eq 6
 //! ```
-//! Positions are never measured again, so that errors add up from motion to motion: drift. The designation alone is a
-//! measurement, by point stereo (R172).
+//! The designation is the only measurement of the position, by point stereo (R172); after it, errors add up from
+//! motion to motion (drift).
 //!
-//! Beyond the paper, the last good stops are remembered; the motion is measured from each of them, and the one is taken that
-//! leaves the target most certain. The same memory finds the target again when an occlusion ends (R186).
+//! Beyond the paper, the last good stops are remembered; the motion is measured from each of them, and the one with
+//! the most certain target is used. The same memory re-acquires the target after an occlusion (R186).
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
-//! | x_then, x_now | `Anchor::position_in_rover`, `Sighting::position_in_rover` | m, rover frame of either stop |
+//! | x_then, x_now | `Carried::position_in_rover`, `Sighting::position_in_rover` | m, rover frame of either stop |
 //! | θ*, T | `MotionFit::after_from_before` | m, rad |
 //! | P_θθ | `Bootstrap::covariance` | m², m rad, rad² |
 //! | P_xx | `Carried::covariance_in_rover` | m² |
@@ -48,13 +48,13 @@ use sightline_geometry::estimate::confidence::confidence;
 use sightline_geometry::estimate::motion_parameters::MotionParameters;
 use sightline_geometry::frames::{Point3, Pose};
 
-/// Stops whose features the store keeps: about a megabyte each.
+/// Number of stops whose features the store keeps: about a megabyte each.
 const STOPS_KEPT: usize = 64;
 
-/// Motions that the store keeps.
+/// Number of motions that the store keeps.
 const MOTIONS_KEPT: usize = 256;
 
-/// The motion of the whole scene by its features (Deans et al. 2005).
+/// Tracks the target by the motion of the features of the whole scene (Deans et al. 2005).
 #[derive(Clone, Copy, Debug)]
 pub struct FeatureTracker;
 
@@ -132,7 +132,7 @@ impl Tracker for FeatureTracker {
     }
 }
 
-/// A stop with its features and the target's position, to measure later motions from.
+/// Returns a stop with its features and the target's position, for measuring later motions.
 fn anchor(evidence: &FeatureEvidence, step: usize, site_from_rover: &Pose) -> Option<Anchor> {
     Some(Anchor {
         step,
@@ -143,8 +143,8 @@ fn anchor(evidence: &FeatureEvidence, step: usize, site_from_rover: &Pose) -> Op
     })
 }
 
-/// The motion from an earlier stop of the recording to this one, kept in the store unless the pose estimates, which a study
-/// may disturb, take part in it.
+/// Returns the motion from an earlier stop of the recording to this one. The store keeps it unless it uses the pose
+/// estimates, which a study may disturb.
 fn kept_motion(
     shared: Option<Shared<'_>>,
     earlier: Option<usize>,
@@ -159,7 +159,7 @@ fn kept_motion(
     }
 }
 
-/// Notes the features of a stop in its evidence.
+/// Records the features of a stop in its evidence.
 fn note(evidence: &mut FeatureEvidence, features: &Arc<StopFeatures>) {
     let mut ranges: Vec<f64> = features.points.iter().map(|point| point.range_m).collect();
     ranges.sort_by(f64::total_cmp);
@@ -174,12 +174,12 @@ fn note(evidence: &mut FeatureEvidence, features: &Arc<StopFeatures>) {
     evidence.features = Some(Arc::clone(features));
 }
 
-/// The motion from one remembered stop, and where it puts the target.
+/// The motion from one remembered stop, and the target moved by it.
 struct Candidate<'a> {
     anchor: &'a Anchor,
     motion: Arc<Motion>,
     confidence: f64,
-    /// The target in the present rover frame.
+    /// The target in the current rover frame; `None` without a motion.
     target: Option<Carried>,
 }
 
@@ -217,7 +217,7 @@ impl<'a> Candidate<'a> {
         }
     }
 
-    /// The target by this motion; `evidence` takes what led to it.
+    /// Locates the target by this motion and adds its steps to `evidence`.
     fn located(
         &self,
         now: &StopFeatures,
@@ -271,8 +271,8 @@ impl<'a> Candidate<'a> {
     }
 }
 
-/// Of the motions that can be trusted the one that leaves the target most certain; where none can, the one that most
-/// matches agree with.
+/// Returns the motion with the most certain target among those of sufficient confidence, or else the motion with the
+/// most inliers.
 fn choose(candidates: &[Candidate<'_>], confidence_min: f64) -> Option<usize> {
     let with_target = || candidates.iter().enumerate().filter(|(_, c)| c.target.is_some());
     let trusted = with_target()
@@ -283,7 +283,7 @@ fn choose(candidates: &[Candidate<'_>], confidence_min: f64) -> Option<usize> {
     trusted.map(|(index, _)| index).or_else(|| most().map(|(index, _)| index))
 }
 
-/// Why there is no motion at all.
+/// Returns why there is no motion.
 fn missing(candidates: &[Candidate<'_>]) -> FeatureFailure {
     let why = candidates.iter().find_map(|c| Some((c.anchor.step, c.motion.fit.missing.clone()?)));
     why.map_or(FeatureFailure::NoAnchor, |(step, reason)| FeatureFailure::NoMotion { step, reason })

@@ -1,9 +1,9 @@
-//! Steps `match_features` (then to now), `fit_motion` and `bootstrap`: the rigid motion between two stops (D§2, R161–R169,
-//! R173–R175).
+//! Steps `match_features` (earlier to current stop), `fit_motion` and `bootstrap`: the rigid motion between two stops
+//! (D§2, R161–R169, R173–R175).
 //!
-//! It is a motion of the whole scene and knows no target: all targets share it (R168, R207). With a prior, a feature is
-//! looked for only near where the pose estimates expect it. Where fewer than n_conf matches agree then, the estimates
-//! themselves are doubted: the features are looked for everywhere, and of both motions that is kept on which more agree.
+//! The motion is that of the whole scene and independent of any target: all targets share it (R168, R207). With a
+//! prior, a feature is searched for only near the pixel predicted from the pose estimates. If that gives fewer than
+//! n_conf inliers, the estimates may be wrong: the whole image is searched, and the motion with more inliers is used.
 
 use nalgebra::Vector6;
 
@@ -21,24 +21,24 @@ use super::detect::StopFeatures;
 use super::settings::FeatureSettings;
 use crate::locate::store::HeapBytes;
 
-/// Shift of the pixels by which their common error is propagated, px: small against what bends the motion.
+/// Pixel shift for the numerical derivative of the motion, px: small compared with the non-linearity of the motion.
 const SHIFT_PX: f64 = 0.05;
 
-/// The shift of the right pixels alone, of those in `Point::by_shift_m`.
+/// Index of the shift of the right pixels alone in `Point::by_shift_m`.
 const DISPARITY: usize = 2;
 
-/// The motion between two stops, with all that led to it.
+/// The motion between two stops, with its matches and covariance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motion {
-    /// Matches of points: `query` of the earlier stop, `train` of the present one.
+    /// Matches of points: `query` of the earlier stop, `train` of the current one.
     pub matches: Vec<Match>,
-    /// The motion that most of them agree with; takes points of the earlier rover frame into the present one.
+    /// The motion with the most inliers; maps points in the earlier rover frame to the current one.
     pub fit: MotionFit,
-    /// How certain it is; none where there is no motion.
+    /// Its covariance; `None` without a motion.
     pub bootstrap: Option<Bootstrap>,
-    /// How it changes with 1σ of the errors that all features share: to the right, down, and of the disparities of both stops.
+    /// Its change by 1σ of each error that all features share: right, down, and disparity of both stops.
     pub by_shared_error: Option<[Vector6<f64>; 3]>,
-    /// Whether there was a prior and too little agreed with it, so that the features were looked for everywhere.
+    /// Whether the prior gave too few inliers and the search of the whole image gave more.
     pub prior_given_up: bool,
 }
 
@@ -48,18 +48,18 @@ impl HeapBytes for Motion {
     }
 }
 
-/// What a motion is measured from.
+/// The input of a measurement of motion.
 #[derive(Clone, Copy, Debug)]
 pub struct MotionInput<'a> {
     /// The features of the earlier stop.
     pub then: &'a StopFeatures,
-    /// The features of the present stop.
+    /// The features of the current stop.
     pub now: &'a StopFeatures,
-    /// The motion by the pose estimates.
+    /// The motion predicted by the pose estimates.
     pub expected_now_from_then: &'a Pose,
-    /// The left camera of the present stop, in its rover frame.
+    /// The left camera of the current stop, in its rover frame.
     pub left: &'a Camera,
-    /// The configuration.
+    /// The settings.
     pub settings: &'a FeatureSettings,
 }
 
@@ -75,7 +75,7 @@ pub fn motion(input: &MotionInput<'_>) -> Motion {
     if free.fit.inliers.len() > agree { Motion { prior_given_up: true, ..free } } else { expected }
 }
 
-/// The motion that most of some matches agree on.
+/// Returns the motion with the most inliers among the matches.
 fn motion_of(input: &MotionInput<'_>, matches: Vec<Match>) -> Motion {
     let MotionInput { then, now, settings, .. } = *input;
     let correspondence = |m: &Match| {
@@ -99,9 +99,9 @@ fn motion_of(input: &MotionInput<'_>, matches: Vec<Match>) -> Motion {
     Motion { matches, fit, bootstrap, by_shared_error, prior_given_up: false }
 }
 
-/// How the motion changes when all pixels of this stop shift, and when all disparities of both stops do: by
-/// `feature_common_px`, times the way of the camera over the range of the features. What looks different from elsewhere looks
-/// the more different the farther away that is.
+/// Returns the change of the motion when all pixels of this stop shift, and when all disparities of both stops shift.
+/// The shift is `feature_common_px`, times the displacement of the camera over the median range: the appearance of
+/// relief changes in proportion to that ratio.
 fn by_shared_error(
     input: &MotionInput<'_>,
     agreeing: &[Match],
@@ -129,7 +129,7 @@ fn by_shared_error(
     Some(changes)
 }
 
-/// The motion of matches that agree, as the fit weights them.
+/// Fits the motion to its inliers, with the weights of the RANSAC fit.
 fn refit(pairs: &[Correspondence], settings: &FeatureSettings) -> Option<Pose> {
     let RansacSettings { weighting, loss, .. } = settings.ransac();
     match weighting {
@@ -142,12 +142,12 @@ fn refit(pairs: &[Correspondence], settings: &FeatureSettings) -> Option<Pose> {
     }
 }
 
-/// Matches of points by the descriptors of their left features (R160, R161).
+/// Matches points by the descriptors of their left features (R160, R161), over the whole image.
 fn match_everywhere(input: &MotionInput<'_>) -> Vec<Match> {
     matching::matches(&descriptors(input.then), &descriptors(input.now), &input.settings.matching())
 }
 
-/// The same, near where the pose estimates expect them if there is a prior.
+/// Matches points; with a prior, only near the pixels predicted by the pose estimates.
 fn match_points(input: &MotionInput<'_>) -> Vec<Match> {
     let MotionInput { then, now, settings, .. } = *input;
     if settings.prior_radius_px <= 0.0 {
@@ -166,7 +166,7 @@ fn match_points(input: &MotionInput<'_>) -> Vec<Match> {
     matching::matches_where(&before, &after, &settings.matching(), is_near)
 }
 
-/// Which features err alike: those of one square of the present image, or else each by itself.
+/// Returns the bootstrap block of a match: its image cell in the current stop, or its index without cells.
 fn block(input: &MotionInput<'_>, index: usize, matched: &Match) -> u32 {
     let cell_px = input.settings.bootstrap_cell_px;
     if cell_px <= 0.0 {

@@ -1,6 +1,6 @@
-//! The tables of the feature locator, read row by row: what page and recording draw (R170).
+//! The tables of the feature locator, read row by row for the page and the recording (R170).
 //!
-//! They come from the trace or, as arrays, over the network; both hold the same numbers, NaN where one does not exist.
+//! They are read from the trace or, as arrays, from the network, with the same numbers; NaN for a missing one.
 
 use nalgebra::{Matrix2, Vector2};
 
@@ -12,63 +12,63 @@ use sightline_geometry::frames::{Pixel, Point3};
 /// A feature of the left image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Feature {
-    /// Where it is, px.
+    /// Its position in the left image, px.
     pub pixel: Pixel,
     /// Its scale, px.
     pub sigma_px: f64,
     /// Its orientation, rad, clockwise on screen from +x.
     pub orientation_rad: f64,
-    /// Its partner in the right image, px; none where it became no point.
+    /// Position of its match in the right image, px; `None` without a triangulated point.
     pub right: Option<Pixel>,
-    /// Distance from the left camera, m.
+    /// Distance from the left camera, m; `None` without a triangulated point.
     pub range_m: Option<f64>,
-    /// Its match with the earlier stop.
+    /// Its match with the earlier stop; `None` without one.
     pub matched: Option<Matched>,
 }
 
 /// The match of a feature with one of an earlier stop.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Matched {
-    /// Where the feature was in the earlier left image, px.
+    /// Position of the feature in the earlier left image, px.
     pub then: Pixel,
-    /// Where the motion puts the earlier point in the present left image, px.
+    /// The earlier point, moved by the motion, in the current left image, px; `None` if not visible.
     pub moved: Option<Pixel>,
-    /// Distance of the two points under the motion, m.
+    /// Distance between the two points after the motion, m.
     pub residual_m: Option<f64>,
-    /// Whether the match agrees with the motion.
+    /// Whether the match is an inlier of the motion.
     pub is_inlier: bool,
 }
 
 impl Matched {
-    /// From where the motion puts the feature to where it was found, px.
+    /// The vector from the pixel predicted by the motion to `found`, px.
     pub fn residual_px(&self, found: Pixel) -> Option<Vector2<f64>> {
         self.moved.map(|moved| Vector2::new(found.x - moved.x, found.y - moved.y))
     }
 }
 
-/// Where a set of the bootstrap puts the target.
+/// The target's position by one bootstrap set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CloudPoint {
     /// The position in the rover frame, m.
     pub position_in_rover: Point3,
-    /// Its pixel in the left image, px.
+    /// Its pixel in the left image, px; `None` if not visible.
     pub left_pixel: Option<Pixel>,
 }
 
-/// The covariance of a moved target in the left image, px² (R180): `J Σ Jᵀ` with the camera's derivative at the
-/// target; none where another tracker located it, whose match has an error of its own.
+/// The covariance of a moved target in the left image, px² (R180): `J Σ Jᵀ` with the camera's Jacobian at the target.
+/// `None` if another tracker located it, because a match has its own error.
 pub fn moved_covariance_px2(located: &Located, left: &Camera) -> Option<Matrix2<f64>> {
     located.evidence.features()?;
     let (_, jacobian) = left.model.project_with_jacobian(located.position_in_rover.as_ref()?)?;
     Some(jacobian * located.covariance_in_rover? * jacobian.transpose())
 }
 
-/// The features of a table's values.
+/// Reads the features from a table's values.
 pub fn features(values: &[f32]) -> impl Iterator<Item = Feature> {
     values.chunks_exact(FeatureColumn::COUNT).filter_map(feature)
 }
 
-/// The points of a cloud's values.
+/// Reads the points from a cloud's values.
 pub fn cloud(values: &[f32]) -> impl Iterator<Item = CloudPoint> {
     values.chunks_exact(CLOUD_COLUMNS).map(|row| {
         let [x, y, z] = [row[0], row[1], row[2]].map(f64::from);
@@ -76,7 +76,7 @@ pub fn cloud(values: &[f32]) -> impl Iterator<Item = CloudPoint> {
     })
 }
 
-/// The feature of a row; none without a place.
+/// Reads the feature of a row; `None` without a pixel.
 fn feature(row: &[f32]) -> Option<Feature> {
     use FeatureColumn::{Orientation, Range, RightX, RightY, Sigma, X, Y};
     let at = |column: FeatureColumn| row[column as usize];

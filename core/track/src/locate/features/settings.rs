@@ -12,22 +12,22 @@ use sightline_geometry::estimate::weighted_motion::Loss;
 use sightline_vision::sift::SiftSettings;
 use sightline_vision::sift::matching::MatchSettings;
 
-/// What decides whether a match agrees with a motion (Deans05 Eq. 2).
+/// The inlier test of a match (Deans05 Eq. 2).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MotionGate {
-    /// A distance in metres, as the paper has it.
+    /// On the residual in metres, as in the paper.
     #[default]
     Distance,
-    /// A distance in standard deviations of the two points.
+    /// On the residual in standard deviations of the two points.
     Mahalanobis,
 }
 
-/// How the matches that agree count in the motion.
+/// The weights of the inliers in the fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MotionWeighting {
-    /// Alike, as the paper has it.
+    /// Equal weights, as in the paper.
     None,
     /// By the covariances of the points: stereo noise grows with the square of the range.
     #[default]
@@ -107,7 +107,7 @@ settings_group! {
 }
 
 impl FeatureSettings {
-    /// How features are found.
+    /// The settings of the feature detector.
     pub fn sift(&self) -> SiftSettings {
         SiftSettings {
             double_image: self.sift_double_image,
@@ -121,13 +121,13 @@ impl FeatureSettings {
         }
     }
 
-    /// How they are matched.
+    /// The settings of the matching.
     pub fn matching(&self) -> MatchSettings {
         let ratio_max = Some(self.ratio_max).filter(|ratio| *ratio < 1.0);
         MatchSettings { ratio_max, mutual: self.mutual_matches }
     }
 
-    /// How a motion is fitted.
+    /// The settings of the motion fit.
     pub fn ransac(&self) -> RansacSettings {
         RansacSettings {
             inlier_m: self.motion_inlier_m,
@@ -144,7 +144,7 @@ impl FeatureSettings {
         }
     }
 
-    /// How its scatter is found.
+    /// The settings of the bootstrap.
     pub fn bootstrap(&self) -> BootstrapSettings {
         BootstrapSettings {
             sets: self.bootstrap_sets,
@@ -154,7 +154,7 @@ impl FeatureSettings {
         }
     }
 
-    /// What the number of matches that agree is worth.
+    /// The settings of the confidence.
     pub fn confidence(&self) -> ConfidenceSettings {
         ConfidenceSettings { inliers_for_half: self.confidence_matches, slope: self.confidence_slope }
     }
@@ -166,7 +166,7 @@ impl FeatureSettings {
         }
     }
 
-    /// Why these settings cannot find anything, as one sentence that names the fields and the way out.
+    /// Returns why these settings can find nothing, as one sentence that names the fields and the remedy.
     pub fn contradiction(&self) -> Option<String> {
         let (low, high) = (self.feature_range_min_m, self.feature_range_max_m);
         (low >= high)

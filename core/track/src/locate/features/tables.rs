@@ -1,4 +1,4 @@
-//! The tables of the feature locator: every feature with its partners and residual, and the cloud of the bootstrap.
+//! The tables of the feature locator: every feature with its matches and residual, and the bootstrap cloud.
 
 use super::detect::StopFeatures;
 use super::evidence::{CLOUD_COLUMNS, FeatureColumn, Table};
@@ -6,7 +6,7 @@ use super::motion::Motion;
 use sightline_geometry::camera::Camera;
 use sightline_geometry::frames::{Pixel, Point3, Pose};
 
-/// A row for every feature of the left image.
+/// Returns a table with one row per feature of the left image.
 pub(super) fn features(now: &StopFeatures) -> Table {
     let mut values = vec![f32::NAN; now.left.keypoints.len() * FeatureColumn::COUNT];
     for (row, keypoint) in values.chunks_exact_mut(FeatureColumn::COUNT).zip(&now.left.keypoints) {
@@ -25,7 +25,7 @@ pub(super) fn features(now: &StopFeatures) -> Table {
     Table { columns: FeatureColumn::COUNT as u32, values }
 }
 
-/// Adds what a motion says of the features that were matched.
+/// Adds the residuals of a motion to the rows of the matched features.
 pub(super) fn add_motion(
     table: &mut Table,
     motion: &Motion,
@@ -58,7 +58,7 @@ fn set(row: &mut [f32], [x, y]: [FeatureColumn; 2], pixel: Pixel) {
     row[y as usize] = pixel.y as f32;
 }
 
-/// Where each of some motions puts a point: the position, and its pixel in the left image.
+/// Returns the position of a point after each of some motions, and its pixel in the left image.
 pub(super) fn cloud(poses: impl Iterator<Item = Pose>, point: &Point3, left: &Camera) -> Table {
     let mut values = Vec::new();
     for pose in poses {

@@ -1,13 +1,13 @@
-//! The line of sight of the designation, carried along and met with the near surface.
+//! The line of sight of the designation, carried to the current stop and intersected with the surface there.
 //!
-//! A person points at a pixel: what is exact is the ray. Its range comes from stereo at the far end of the drive, where a
-//! pixel of disparity is tens of centimetres, and a tracker that only carries positions keeps that error for good.
-//! Registration knows where the first view's rays lie in the present one; where the ray meets the present surface, whose
-//! points are known to millimetres, is the target.
+//! A designation is a pixel, so its ray is exact. Its range is measured at the far end of the drive, where a pixel of
+//! disparity is tens of centimetres, and a tracker that only carries positions never corrects this error.
+//! Registration gives the rays of the first view in the current frame. The target is the intersection of the ray with
+//! the current surface, whose points are accurate to millimetres.
 //! ```text
-//! o' = T⁻¹ o,  u' = R⁻¹ u                         the ray in the present frame
+//! o' = T⁻¹ o,  u' = R⁻¹ u                         the ray in the current frame
 //! x  = first facet that it crosses near the registered target
-//! A  = I − u' nᵀ / (n · u')                       how x follows a shift of the ray: along u' not at all
+//! A  = I − u' nᵀ / (n · u')                       derivative of x with respect to a shift of the ray; A u' = 0
 //! Σ  = A (Σ_reg + R⁻¹ Σ_first R) Aᵀ + u' u'ᵀ σ_s² / (n · u')²
 //! ```
 //! | symbol | our name | unit, frame |
@@ -18,7 +18,7 @@
 //!
 //! At grazing incidence a small shift moves the point far; below 15° the ray is not used.
 //!
-//! Source: ours; D§2 leaves the target where it was designated.
+//! Source: ours; D§2 keeps the designated position.
 
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
@@ -28,18 +28,17 @@ use sightline_geometry::frames::{Point3, Pose, Ray, Vector3};
 use sightline_record::{Declaration, Record, Unit};
 use sightline_vision::registration::Mesh;
 
-/// The surface's normal is a mean over this distance, m.
+/// The surface's normal is averaged within this distance, m.
 const AROUND_M: f64 = 0.02;
-/// Sine of the least angle between ray and surface: 15°.
+/// Sine of the smallest accepted angle between ray and surface: 15°.
 const GRAZING: f64 = 0.259;
-/// A ray that meets the surface farther than this from the registered target meets something else, as a share of the half
-/// width.
+/// Largest distance of the intersection from the registered target, in half widths; beyond it the ray meets something else.
 const FAR: f64 = 1.0;
 
-/// Where the carried ray met the present surface.
+/// The intersection of the carried ray with the current surface.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct RayMeeting {
-    /// How far from the target as registration alone has it, m.
+    /// Distance from the target by registration alone, m.
     pub moved_m: f64,
     /// Angle between the ray and the surface's normal, deg.
     pub incidence_deg: f64,
@@ -48,30 +47,30 @@ pub struct RayMeeting {
 /// A target on a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Met {
-    /// The target, m, present rover frame.
+    /// The target, m, current rover frame.
     pub position: Point3,
     /// Its covariance, m².
     pub covariance: Matrix3<f64>,
-    /// What happened.
+    /// The intersection, for the evidence.
     pub meeting: RayMeeting,
 }
 
-/// What registration knows.
+/// The designated ray and the target by registration.
 #[derive(Clone, Copy)]
 pub(super) struct Carried<'a> {
     /// The ray of the designation, in the frame of the first view.
     pub ray: &'a Ray,
-    /// T.
+    /// The rigid motion T.
     pub fixed_from_moving: &'a Pose,
-    /// The target by registration alone, m, present rover frame.
+    /// The target by registration alone, m, current rover frame.
     pub registered: Point3,
-    /// Its covariance, that of the first view included, m².
+    /// Its covariance, including that of the first view, m².
     pub covariance: Matrix3<f64>,
     /// Half the width of the rock, m.
     pub half_width_m: f64,
 }
 
-/// Where the ray meets the surface near the registered target; none where it does not, or only grazes it.
+/// Intersects the ray with the surface near the registered target; `None` if it misses or grazes the surface.
 pub(super) fn meet(carried: &Carried<'_>, surface: &Mesh) -> Option<Met> {
     let moving_from_fixed = carried.fixed_from_moving.inverse();
     let origin = moving_from_fixed * carried.ray.origin;
@@ -82,7 +81,7 @@ pub(super) fn meet(carried: &Carried<'_>, surface: &Mesh) -> Option<Met> {
         let point = origin + direction * crossing(&origin, &direction, corners)?;
         ((point - carried.registered).norm() <= reach_m).then_some((point, *triangle))
     });
-    // Of several facets behind one another the eye sees the first.
+    // Of several facets along the ray, the camera sees the first.
     let (position, triangle) =
         crossings.min_by(|a, b| (a.0 - origin).norm().total_cmp(&(b.0 - origin).norm()))?;
     let normal = normal_around(surface, &position, AROUND_M)?;
@@ -90,7 +89,7 @@ pub(super) fn meet(carried: &Carried<'_>, surface: &Mesh) -> Option<Met> {
     if facing.abs() < GRAZING {
         return None;
     }
-    // The errors of neighbours are alike, so that a mean over three vertices is no better than one of them.
+    // The errors of neighbours are correlated: a mean over three vertices is no more accurate than one of them.
     let sight = (position - surface.viewpoint).normalize();
     let range_sigma_m =
         triangle.iter().map(|&corner| f64::from(surface.range_sigma_m[corner as usize])).sum::<f64>() / 3.0;
@@ -105,7 +104,7 @@ pub(super) fn meet(carried: &Carried<'_>, surface: &Mesh) -> Option<Met> {
     Some(Met { position, covariance, meeting })
 }
 
-/// How far along a ray it crosses a triangle, m (Möller and Trumbore 1997).
+/// Returns the distance along a ray to a triangle, m; `None` if it misses (Möller and Trumbore 1997).
 fn crossing(origin: &Point3, direction: &Vector3, [a, b, c]: [Point3; 3]) -> Option<f64> {
     let (first, second) = (b - a, c - a);
     let across = direction.cross(&second);
@@ -121,7 +120,7 @@ fn crossing(origin: &Point3, direction: &Vector3, [a, b, c]: [Point3; 3]) -> Opt
     Some(second.dot(&other) / volume).filter(|distance_m| is_inside && *distance_m > 0.0)
 }
 
-/// The mean normal of the facets around a point, weighed by their areas.
+/// Returns the mean normal of the facets around a point, weighted by their areas.
 pub(super) fn normal_around(surface: &Mesh, point: &Point3, around_m: f64) -> Option<Vector3> {
     let mut sum = Vector3::zeros();
     for triangle in &surface.triangles {
@@ -149,7 +148,7 @@ mod tests {
 
     use super::*;
 
-    /// A wall that leans, seen from the origin: x = 2 + 0.5 z.
+    /// A leaning wall, seen from the origin: x = 2 + 0.5 z.
     fn wall() -> Mesh {
         let point = |y: f64, z: f64| Point3::new(2.0 + 0.5 * z, y, z);
         let mut mesh = Mesh::default();
@@ -178,7 +177,7 @@ mod tests {
         let eye = fixed_from_moving * Point3::new(-5.0, 0.4, -0.6);
         let ray = Ray { origin: eye, direction: (fixed_from_moving * truth - eye).normalize() };
         let along = fixed_from_moving.inverse() * ray.direction;
-        // The first range was 6 cm wrong; across, a millimetre is known.
+        // The first range is 6 cm wrong; the error across is 1 mm.
         let covariance = along * along.transpose() * 0.06f64.powi(2) + Matrix3::identity() * 1e-6;
         let carried = Carried {
             ray: &ray,
@@ -192,7 +191,7 @@ mod tests {
         assert!((met.meeting.moved_m - 0.06).abs() < 1e-9);
         let sigma_m = met.covariance.symmetric_eigenvalues().max().sqrt();
         assert!((0.001..0.004).contains(&sigma_m), "{sigma_m}");
-        // A shift of the ray by ε moves the meeting by A ε: as the covariance says.
+        // A shift of the ray by ε moves the intersection by A ε, as in the covariance.
         let shift = Vector3::new(0.0, 0.0, 1e-4);
         let moved = Ray { origin: ray.origin + fixed_from_moving.rotation * shift, ..ray };
         let again = meet(&Carried { ray: &moved, ..carried }, &surface).unwrap();

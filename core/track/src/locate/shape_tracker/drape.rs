@@ -1,23 +1,23 @@
-//! The last mast image draped over the last mast surface, as the other camera would see it, and found in its image.
+//! The last mast image, draped over the last mast surface as the other camera would see it, and matched in its image.
 //!
-//! A flat face says nothing about a shift along itself, and half a rock, which is all that both eyes of a wide pair see from
-//! near by, says little; its texture does. At a hand-off both images are of one moment and one light, so that after the
-//! surfaces are registered only a small shift is left to find.
+//! A flat face does not constrain a shift along itself, and the half of a rock that both cameras of a wide pair see
+//! from near by constrains it little; its texture does. At a hand-off both images have the same time and light, so
+//! that only a small shift is left after the registration of the surfaces.
 //! ```text
-//! pixel u of the present camera → ray → the earlier surface, where T puts it → pixel of the earlier left image
-//! u*  = best normalised correlation of that picture about the registered target
-//! x   = where the ray of u* meets the plane of the surface under the target
+//! pixel u of the current camera → ray → the earlier surface, moved by T → pixel of the earlier left image
+//! u*  = best normalised correlation of the draped image about the registered target
+//! x   = intersection of the ray of u* with the plane of the surface under the target
 //! Σ   = J Σ_u Jᵀ + d dᵀ (nᵀ Σ_reg n + σ²) / (n · d)²                J = ∂x/∂u
 //! ```
-//! Beyond the earlier mesh the plane under the target is continued: the left image shows more than both eyes saw.
+//! Beyond the earlier mesh the plane under the target is used: the left image covers more than both cameras saw.
 //!
 //! | symbol | our name | unit, frame |
 //! |---|---|---|
 //! | T | `fixed_from_moving` | rigid motion |
 //! | u*, Σ_u | [`Draped::pixel`], [`Draped::covariance_px2`] | px, px² |
-//! | n, d | normal under the target, direction of the ray | –, present rover frame |
+//! | n, d | normal under the target, direction of the ray | –, current rover frame |
 //!
-//! Source: ours; D§4 hands over by the shape alone.
+//! Source: ours; D§4 hands off by the shape alone.
 
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2};
 use serde::{Deserialize, Serialize};
@@ -39,69 +39,69 @@ use sightline_vision::image::sample::Kernel;
 use sightline_vision::image::{GrayImage, PixelRect};
 use sightline_vision::registration::{RangeImage, RangeSensor};
 
-/// Pixels of a side of the sensor through which the mesh is seen.
+/// Side of the sensor that renders the mesh, px.
 const SENSOR_PX: usize = 160;
-/// The plane is a mean over this distance, m.
+/// The normal of the plane is averaged within this distance, m.
 const PLANE_M: f64 = 0.05;
-/// The farthest shift that is looked for, px.
+/// Largest shift searched, px.
 const SHIFT_MAX_PX: f64 = 40.0;
-/// The smallest window that says where it belongs, px.
+/// Smallest window that is matched, px.
 const WINDOW_MIN_PX: u32 = 7;
-/// The least cosine between the ray and the plane's normal.
+/// Smallest accepted cosine between the ray and the plane's normal.
 const GRAZING: f64 = 0.08;
 
-/// The draped picture, found.
+/// The match of the draped image.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Draped {
-    /// Where the target is in the present left image, px.
+    /// Position of the target in the current left image, px.
     pub pixel: Pixel,
     /// Score of the match.
     pub score: f64,
-    /// How far from the registered target, px.
+    /// Distance from the registered target, px.
     pub correction_px: f64,
     /// Covariance of the match, px².
     #[schema(value_type = Vec<f64>)]
     pub covariance_px2: Matrix2<f64>,
-    /// Share of the window that shows the earlier mesh; the rest is the plane.
+    /// Share of the window on the earlier mesh; the rest is on the plane.
     pub on_mesh: f64,
-    /// The draped picture.
+    /// The draped image.
     #[serde(skip)]
     #[schema(ignore)]
     pub picture: Unsent<Table>,
-    /// The present image at the match.
+    /// The current image at the match.
     #[serde(skip)]
     #[schema(ignore)]
     pub matched: Unsent<Table>,
 }
 
-/// What is draped over what, and where it is looked for.
+/// The earlier view and the image in which it is searched for.
 #[derive(Clone, Copy)]
 pub struct DrapeInput<'a> {
     /// The earlier view.
     pub view: &'a View,
-    /// T.
+    /// The rigid motion T.
     pub fixed_from_moving: &'a Pose,
-    /// The target by registration, m, present rover frame.
+    /// The target by registration, m, current rover frame.
     pub registered: &'a Point3,
     /// Its covariance by the registration alone, m².
     pub covariance: &'a Matrix3<f64>,
-    /// The present left camera.
+    /// The current left camera.
     pub camera: &'a Camera,
-    /// The present left image.
+    /// The current left image.
     pub image: &'a GrayImage,
     /// Side of the window, px; odd.
     pub window_px: u32,
-    /// Least score of a match.
+    /// Smallest accepted score of a match.
     pub score_min: f64,
 }
 
-/// A target that was found so: position (m) and covariance (m²), present rover frame.
+/// A target located by a draped image: position (m) and covariance (m²) in the current rover frame, and the match.
 pub type Placed = (Point3, Matrix3<f64>, Draped);
 
-/// Finds the draped picture; where the earlier image does not show a window that large, a smaller one.
+/// Matches the draped image; if that fails, smaller windows are tried.
 ///
 /// # Errors
-/// A sentence that says why there is no match.
+/// The reason why the last window tried has no match.
 pub fn drape(input: &DrapeInput<'_>) -> Result<Placed, DrapeFailure> {
     let smaller = [1.0, 0.7, 0.5].map(|share| (f64::from(input.window_px) * share) as u32 | 1);
     let sizes = smaller.into_iter().filter(|&size| size >= WINDOW_MIN_PX);
@@ -115,7 +115,7 @@ pub fn drape(input: &DrapeInput<'_>) -> Result<Placed, DrapeFailure> {
     tried
 }
 
-/// Finds the draped picture of one size.
+/// Matches the draped image for one window size.
 fn drape_window(input: &DrapeInput<'_>) -> Result<Placed, DrapeFailure> {
     let camera = input.camera;
     let start = camera.project(input.registered).ok_or(DrapeFailure::TargetOutside)?;
@@ -140,7 +140,7 @@ fn drape_window(input: &DrapeInput<'_>) -> Result<Placed, DrapeFailure> {
     if best.at_edge {
         return Err(DrapeFailure::AtSearchEdge);
     }
-    // The picture is about the whole pixel next to the registered target, and both shift alike.
+    // The draped image is centred on the whole pixel nearest to the registered target; both shift by the same amount.
     let centre = whole(start);
     let pixel = start.offset(best.pixel.x - centre.x, best.pixel.y - centre.y);
     let matched = patch::extract(input.image, best.pixel, input.window_px / 2, Kernel::Bicubic);
@@ -165,7 +165,7 @@ fn drape_window(input: &DrapeInput<'_>) -> Result<Placed, DrapeFailure> {
     Ok((position, covariance, draped))
 }
 
-/// The whole pixel next to a place.
+/// Rounds to the nearest whole pixel.
 fn whole(pixel: Pixel) -> Pixel {
     Pixel::new(pixel.x.round(), pixel.y.round())
 }
@@ -174,14 +174,14 @@ fn table(patch: &Patch) -> Table {
     Table { columns: patch.width(), values: patch.as_raw().clone() }
 }
 
-/// ∂x/∂u.
+/// ∂x/∂u, m per px.
 fn derivative(place: &impl Fn(Pixel) -> Option<Point3>, at: Pixel) -> Option<Matrix3x2<f64>> {
     let along = place(at.offset(0.5, 0.0))? - place(at.offset(-0.5, 0.0))?;
     let down = place(at.offset(0.0, 0.5))? - place(at.offset(0.0, -0.5))?;
     Some(Matrix3x2::from_columns(&[along, down]))
 }
 
-/// The plane of the surface under the target, present rover frame.
+/// The plane of the surface under the target, current rover frame.
 #[derive(Clone, Copy)]
 struct Plane {
     point: Point3,
@@ -200,7 +200,7 @@ impl Plane {
     }
 }
 
-/// The earlier surface as the present camera sees it.
+/// The earlier surface, rendered from the current camera.
 struct Surface {
     plane: Plane,
     sensor: RangeSensor,
@@ -216,19 +216,19 @@ impl Surface {
         let plane = Plane { point: *input.registered, normal };
         let centre = input.camera.ray(start)?;
         plane.cross(&centre)?;
-        // Wide enough for the corners of the window, whatever the lens does to them.
+        // Wide enough for the corners of the window under any lens distortion.
         let half = f64::from(input.window_px) / 2.0 + 2.0;
         let corner = input.camera.ray(start.offset(half, half))?;
         let half_angle_rad = 1.2 * centre.direction.angle(&corner.direction);
         let sensor =
             RangeSensor::pinhole(&centre.origin, &centre.direction, half_angle_rad, [SENSOR_PX, SENSOR_PX]);
-        // The sensor's "fixed" frame is the present rover frame here.
+        // The sensor's "fixed" frame is the current rover frame here.
         let sensor_from_moving = sensor.sensor_from_fixed;
         let image = sensor.see(&input.view.mesh, &(sensor_from_moving * moving_from_fixed));
         Some(Self { plane, sensor, sensor_from_moving, image })
     }
 
-    /// The point that a pixel of the present camera sees, and whether it is on the mesh.
+    /// Returns the surface point at a pixel of the current camera, and whether it is on the mesh.
     fn point(&self, camera: &Camera, pixel: Pixel) -> Option<(Point3, bool)> {
         let ray = camera.ray(pixel)?;
         let on_plane = self.plane.cross(&ray)?;
@@ -247,7 +247,7 @@ impl Surface {
         Some((ray.at((depth_m - from.z) / axis.z), true))
     }
 
-    /// The draped picture about the whole pixel next to `start`, and the share of it on the mesh.
+    /// Renders the draped image about the whole pixel nearest to `start`; also returns its share on the mesh.
     fn picture(&self, input: &DrapeInput<'_>, start: Pixel) -> Result<(Patch, f64), DrapeFailure> {
         let (view, camera, size) = (input.view, input.camera, input.window_px);
         let centre = whole(start);
@@ -261,7 +261,7 @@ impl Surface {
         };
         let wide = flat(1.0, 0.0).zip(flat(-1.0, 0.0)).zip(flat(0.0, 1.0).zip(flat(0.0, -1.0)));
         let ((right, left), (down, up)) = wide.ok_or(DrapeFailure::TargetUnseen)?;
-        // Pixels of the earlier image for one of the present, as an area.
+        // Area of a current pixel in the earlier image, px².
         let area = ((right.x - left.x) * (down.y - up.y) - (right.y - left.y) * (down.x - up.x)).abs() / 4.0;
         let scale = 1.0 / area.sqrt().max(1e-6);
         let picture = patch::warp_by(&view.image, scale, size, Kernel::Bicubic, source);
@@ -300,10 +300,10 @@ impl Record for Draped {
     }
 }
 
-/// The arrays of this stage that panels draw by themselves.
+/// Names of the arrays of this stage that a panel draws individually.
 impl ArrayName {
-    /// At a hand-off, the earlier image draped over the surface as the present camera would see it.
+    /// At a hand-off, the earlier image draped over the surface as the current camera would see it.
     pub const DRAPED: Self = Self::new("draped");
-    /// The present image where it was found.
+    /// The current image at its match.
     pub const DRAPED_MATCH: Self = Self::new("draped_match");
 }

@@ -88,7 +88,7 @@ pub struct Registered {
     pub checks: Vec<Gate>,
     /// Why the registration is not used; null if it is used.
     pub failure: Option<Failure>,
-    /// That failure as one sentence.
+    /// The failure as one sentence; null without one.
     pub reason: Option<String>,
 }
 
@@ -127,7 +127,7 @@ impl ShapeEvidence {
         ]
     }
 
-    /// The checks of the registration; none without one.
+    /// The checks of the registration; `None` without one.
     pub(super) fn checks(&self) -> Option<&[Gate]> {
         self.registration.as_ref().map(|found| found.checks.as_slice())
     }
@@ -141,22 +141,22 @@ impl Registered {
     }
 }
 
-/// The arrays of a stop, each empty where its step was not reached.
+/// The arrays of a stop, each empty if its step was not reached.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ShapeArrays {
     /// Disparities of the aligned left image, px.
     pub disparities: Table,
     /// Distances from the left camera, m.
     pub ranges: Table,
-    /// The earlier surface as the virtual sensor sees it: depth, m.
+    /// Depth of the earlier surface in the virtual sensor, m.
     pub sensor: Table,
     /// Current minus earlier depth at the start, m.
     pub error_before: Table,
-    /// The same after the coarse search.
+    /// Current minus earlier depth after the coarse search, m.
     pub error_coarse: Table,
-    /// The same at the end.
+    /// Current minus earlier depth at the end, m.
     pub error_fine: Table,
-    /// Mean distance for every shift of the coarse search, m, the first row at the least Δy.
+    /// Mean distance for every shift of the coarse search, m; the first row has the smallest Δy.
     pub coarse: Table,
     /// The steps of the refinement, one row each, with the columns of [`PATH_COLUMNS`].
     pub path: Table,
@@ -166,7 +166,7 @@ pub struct ShapeArrays {
     pub mesh_moving: Table,
 }
 
-/// Columns of [`ShapeArrays::path`]: values computed so far, run, J (m), and the offset: shift (m) and turn (rad).
+/// Columns of [`ShapeArrays::path`]: evaluations so far, run, J (m), and the offset: shift (m) and rotation (rad).
 pub const PATH_COLUMNS: usize = 9;
 
 /// Columns of a mesh.
@@ -329,26 +329,26 @@ impl ShapeArrays {
     }
 }
 
-/// The arrays of this stage that panels draw by themselves.
+/// Names of the arrays of this stage that a panel draws individually.
 impl ArrayName {
     /// Disparities of the aligned left image, px.
     pub const DISPARITIES: Self = Self::new("disparities");
     /// Distances from the left camera in the aligned left image, m.
     pub const RANGES: Self = Self::new("ranges");
-    /// The earlier surface in the virtual range sensor: depth, m.
+    /// Depth of the earlier surface in the virtual range sensor, m.
     pub const SENSOR: Self = Self::new("sensor");
-    /// Present less earlier depth there before the registration, m.
+    /// Current minus earlier depth before the registration, m.
     pub const ERROR_BEFORE: Self = Self::new("error_before");
-    /// Present less earlier depth after the coarse search, m.
+    /// Current minus earlier depth after the coarse search, m.
     pub const ERROR_COARSE: Self = Self::new("error_coarse");
-    /// Present less earlier depth at the end, m.
+    /// Current minus earlier depth at the end, m.
     pub const ERROR_FINE: Self = Self::new("error_fine");
     /// Mean distance of the surfaces for every shift of the coarse search, m.
     pub const COARSE_SEARCH: Self = Self::new("coarse_search");
     /// Steps of the refinement, a row each, with the columns of [`PATH_COLUMNS`].
     pub const REFINE_PATH: Self = Self::new("refine_path");
-    /// The earlier mesh, a row a facet: x, y, z of its corners in the present rover frame, m.
+    /// The earlier mesh, one row per facet: x, y, z of its corners in the current rover frame, m.
     pub const MESH_FIXED: Self = Self::new("mesh_fixed");
-    /// The present mesh: columns and frame as in `mesh_fixed`.
+    /// The current mesh: columns and frame as in `mesh_fixed`.
     pub const MESH_MOVING: Self = Self::new("mesh_moving");
 }

@@ -45,7 +45,7 @@ pub enum DrapeFailure {
     LowScore {
         /// The best score.
         score: f64,
-        /// The least one (`hand_off_score_min`).
+        /// The smallest accepted score (`hand_off_score_min`).
         limit: f64,
     },
     /// The best match may be outside the search region.

@@ -7,7 +7,7 @@
 //! | 13 `shape_sigma_m` | largest 1σ axis of the target by the registration | ≤ `shape_sigma_max_m` |
 //! | 14 `shape_turn_deg` | rotation of the refinement | ≤ `shape_turn_max_deg` |
 //! | 15 `shape_other_minimum` | mean distance at the next minimum over that at the best | ≥ `shape_other_min` |
-//! | 16 `shape_edge_distance_m` | from the best shift to the border of the coarse search | ≥ half a step of it |
+//! | 16 `shape_edge_distance_m` | distance of the best shift from the border of the coarse search | ≥ half a search step |
 //! | 17 `picture_ncc` | score of the draped image at a hand-off; replaces 15 and 16 | ≥ `hand_off_score_min` |
 
 use nalgebra::Matrix3;
@@ -81,17 +81,17 @@ pub(super) const GATES: [GateKind; 7] =
 pub(super) const WITH_CONFIDENCE: [GateKind; 8] =
     [CONFIDENCE, OVERLAP, MISFIT, SIGMA, TURN, OTHER_MINIMUM, EDGE_DISTANCE, PICTURE_NCC];
 
-/// The gates of an update that a registration decides, from its checks; without a registration the first gate fails.
+/// The gates of an update judged by a registration: its checks. Without a registration the first gate fails.
 pub(super) fn of_registration(checks: Option<&[Gate]>) -> Vec<Gate> {
     checks.map_or_else(|| vec![OVERLAP.judge(None, 0.0)], <[Gate]>::to_vec)
 }
 
-/// The numbers of a registration that `failure` weighs, in its order.
+/// The gates that `failure` applies to a registration, in its order.
 pub(super) fn checks(found: &Registration, half_width_m: f64, settings: &ShapeSettings) -> Vec<Gate> {
     let limits = &settings.checks;
     let agreement = found.agreement[2];
     let best = found.coarse.best;
-    // Without another minimum none is nearly as good.
+    // 99 if there is no other minimum.
     let ratio =
         best.map(|best| found.coarse.other.map_or(99.0, |other| (other.mean_m / best.mean_m).min(99.0)));
     let range_m = settings.search_half_range_m.unwrap_or(half_width_m);
@@ -110,8 +110,8 @@ pub(super) fn checks(found: &Registration, half_width_m: f64, settings: &ShapeSe
     ]
 }
 
-/// Judges a draped image that was found by its own score: it holds the target where the surfaces let it slide, so that
-/// neither another minimum nor the border of the search matters.
+/// Judges a draped image by the score of its match. It constrains the target where the surfaces let it slide, so that
+/// the gates on another minimum and on the border of the search do not apply.
 pub(super) fn add_picture(gates: &mut Vec<Gate>, score: f64, covariance: &Matrix3<f64>, score_min: f64) {
     let sigma_m = covariance.symmetric_eigenvalues().max().max(0.0).sqrt();
     gates.retain(|gate| ![OTHER_MINIMUM.name, EDGE_DISTANCE.name].contains(&gate.name.as_str()));

@@ -1,12 +1,12 @@
-//! Half the width of the rock under a target, by its first surface: what the sensor must span (R191, R155).
+//! Half the width of the rock under a target, from its first surface; the sensor must cover it (R191, R155).
 //!
 //! ```text
-//! ground:   z = a x + b y + c over the vertices within 0.7 m, those more than 2 cm above it weighed by 1/50, ten times
-//! rock:     the vertices more than max(3 cm, ¼ height of the target) above it that facets join to the target
+//! ground:   z = a x + b y + c over the vertices within 0.7 m; ten iterations, those more than 2 cm above weighted by 1/50
+//! rock:     the vertices more than max(3 cm, ¼ height of the target) above it that facets connect to the target
 //! half width = ½ (max − min) of (v − target) · (level direction across the line of sight)
 //! ```
-//! What stands above the ground pulls a plain fit up; weighing it down leaves the ground, as asymmetric least squares
-//! leave a lower envelope. A target on the ground has no width.
+//! Objects above the ground bias an unweighted fit upwards. The small weights make it follow the ground, like the
+//! lower envelope of asymmetric least squares. A target on the ground has no width.
 //!
 //! Frame: rover, z down. Source: ours.
 
@@ -15,22 +15,22 @@ use nalgebra::{Matrix3, Vector3};
 use sightline_geometry::frames::Point3;
 use sightline_vision::registration::Mesh;
 
-/// Ground is looked for this far around the target, m.
+/// The ground is fitted within this horizontal distance of the target, m.
 const AROUND_M: f64 = 0.7;
-/// What is this much above the plane does not count as ground, m.
+/// Vertices more than this above the plane are down-weighted, m.
 const ABOVE_M: f64 = 0.02;
-/// Weight of what is above.
+/// Weight of these vertices.
 const WEIGHT_ABOVE: f64 = 0.02;
-/// Rounds of the fit.
+/// Number of iterations of the fit.
 const ROUNDS: usize = 10;
-/// Rock begins at this height, m, or at this share of the target's.
+/// Smallest height of rock: m, and share of the target's height; the larger one applies.
 const ROCK_FROM: (f64, f64) = (0.03, 0.25);
-/// The rock is joined to the target by vertices this near, m.
+/// The connected region starts from rock vertices within this distance of the target, m.
 const NEAR_M: f64 = 0.05;
-/// The least and greatest half width that is believed, m.
+/// Smallest and largest accepted half width, m.
 const BELIEVED_M: [f64; 2] = [0.06, 0.5];
 
-/// Half the width of what stands under the target, m; none where nothing does, or where it is not seen.
+/// Half the width of the rock under the target, m; `None` without rock, or if the width is outside the accepted range.
 pub(super) fn half_width_m(mesh: &Mesh, target: &Point3) -> Option<f64> {
     let ground = ground(mesh, target)?;
     let height = |point: &Point3| ground[0] * point.x + ground[1] * point.y + ground[2] - point.z;
@@ -52,7 +52,7 @@ pub(super) fn half_width_m(mesh: &Mesh, target: &Point3) -> Option<f64> {
     (BELIEVED_M[0]..=BELIEVED_M[1]).contains(&half_width_m).then_some(half_width_m)
 }
 
-/// The ground as z = a x + b y + c.
+/// Fits the ground z = a x + b y + c; returns (a, b, c).
 fn ground(mesh: &Mesh, target: &Point3) -> Option<Vector3<f64>> {
     let near: Vec<&Point3> =
         mesh.vertices.iter().filter(|vertex| (*vertex - target).xy().norm() < AROUND_M).collect();
@@ -71,7 +71,7 @@ fn ground(mesh: &Mesh, target: &Point3) -> Option<Vector3<f64>> {
     plane
 }
 
-/// Marks all vertices of the rock that facets join to marked ones.
+/// Marks all rock vertices that facets connect to marked ones.
 fn spread(mesh: &Mesh, is_rock: &[bool], is_reached: &mut [bool]) {
     loop {
         let mut grew = false;
@@ -95,14 +95,15 @@ mod tests {
     use super::*;
     use sightline_vision::registration::{MeshSettings, PointGrid};
 
-    /// A camera 1.5 m above sloping ground sees a box-shaped rock, `half_m` to each side, of which it sees front and top.
+    /// A camera 1.5 m above sloping ground with a box-shaped rock, `half_m` to each side, of which front and top are
+    /// visible.
     fn mesh(half_m: f64, height_m: f64) -> (Mesh, Point3) {
         let viewpoint = Point3::new(0.0, 0.0, -1.2);
         let mut grid = PointGrid::empty(240, 240);
         let ground_at = |x: f64, y: f64| 0.3 + 0.05 * x + 0.02 * y;
         for row in 0..240 {
             for column in 0..240 {
-                // Straight down upon a map: neighbours in the grid are neighbours on the ground.
+                // Sampled on a map: neighbours in the grid are neighbours on the ground.
                 let (x, y) = (2.0 + (120.0 - row as f64) * 0.006, (column as f64 - 120.0) * 0.006);
                 let is_rock = (x - 2.0).abs() < half_m && y.abs() < half_m;
                 let up = if is_rock { height_m } else { 0.0 };

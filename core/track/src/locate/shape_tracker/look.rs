@@ -14,7 +14,7 @@ use sightline_geometry::cancel::Cancel;
 use sightline_geometry::frames::Point3;
 use sightline_vision::registration::{Mesh, Region, ShapeSettings, region_radius_m};
 
-/// A stop as dense stereo needs it.
+/// The input of dense stereo at a stop.
 #[derive(Clone, Copy)]
 pub(super) struct Look<'a> {
     pub(super) capture: &'a Capture,
@@ -25,7 +25,7 @@ pub(super) struct Look<'a> {
 }
 
 impl Look<'_> {
-    /// The surface of the stop around a target; a sentence where there is none.
+    /// Returns the surface of the stop around a target.
     pub(super) fn surface(&self, target: &Point3) -> Result<Arc<StopSurface>, ShapeFailure> {
         let distance_m = (target - self.cameras[0].model.centre()).norm();
         let stereo = self.settings.shape.stereo(distance_m);
@@ -34,19 +34,19 @@ impl Look<'_> {
     }
 }
 
-/// The region of the target's surroundings that a mesh covers.
+/// The region around the target that a mesh covers.
 pub(super) fn region(centre: Point3, half_width_m: f64, settings: &ShapeSettings) -> Region {
     Region { centre, radius_m: region_radius_m(half_width_m, settings, 0.0) }
 }
 
-/// Notes the surface of a stop in its evidence.
+/// Records the surface of a stop in its evidence.
 pub(super) fn note(evidence: &mut ShapeEvidence, surface: &StopSurface, mesh: &Mesh) {
     evidence.surface = Some(surface.seen(mesh));
     let arrays = evidence.arrays.get_or_default();
     (arrays.disparities, arrays.ranges) = (surface.shown_disparities(), surface.shown_ranges());
 }
 
-/// The confidence that the features need: more once the target is lost (R185).
+/// The confidence that the features must reach: `confidence_min`, or `confidence_return` once the target is lost (R185).
 pub(super) fn least_confidence(input: &LocateInput<'_>) -> f64 {
     let limits = &input.settings.limits;
     if input.lost_count > 0 { limits.confidence_return } else { limits.confidence_min }

@@ -1,20 +1,20 @@
 //! The shape tracker, and the combined one: `surface` → `coarse_register` → `refine_register` → `carried_ray`
 //! (Deans et al. 2005, D§2 and D§4).
 //!
-//! | tracker | on the way | at the last stop of a camera pair | where another pair takes over |
+//! | tracker | during the drive | at the last stop of a camera pair | at a hand-off |
 //! |---|---|---|---|
-//! | `shape` | registered to the first view, stop by stop (R189) | alike | registered to the last view of the old pair |
-//! | `combined` | features (R154) | features, then registered to the first view | alike |
+//! | `shape` | registered to the first view, stop by stop (R189) | as during the drive | registered to the last view of the old pair |
+//! | `combined` | features (R154) | features, then registered to the first view | as `shape` |
 //!
 //! ```text
 //! start            the target by features or by dead reckoning, the attitude by the pose estimates      (R197)
 //! registration     x = T⁻¹ x_first                                   Σ = Σ_reg + R⁻¹ Σ_first R
-//! carried ray      x = where the designation's line of sight, carried by T, meets the present surface
+//! carried ray      x = intersection of the designation's line of sight, carried by T, with the current surface
 //! ```
-//! At a hand-off the last image is draped over its surface and found in the new camera's image (`drape`), which holds the
-//! target where flat faces let it slide. What features add up on the way is gone at the end, and with the ray so is the error of the first range. A
-//! registration that fails says why and leaves the target to the features, where those are sure; where other cameras
-//! took over there are no features to fall back upon.
+//! At a hand-off the last image is draped over its surface and matched in the new camera's image (`drape`), which
+//! constrains the target where flat faces let it slide. The registration at the end removes the error that the
+//! features accumulated, and the ray that of the first range. A registration that fails reports why and leaves the
+//! target to the features if their confidence suffices; at a hand-off there are no features to fall back on.
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
@@ -22,7 +22,7 @@
 //! | x_first, Σ_first | `View::position_in_rover`, `View::covariance_in_rover` | m, m², rover frame of the first view |
 //! | Σ_reg | `Registration::covariance_in_moving` | m² |
 //!
-//! One stop's registration is in `register_stop`; what the arm is told at the end in `placement`.
+//! The registration of one stop is in `register_stop`, the instrument-placement target in `placement`.
 //!
 //! Source: D§2, D§4; R146, R154, R187–R206.
 
@@ -58,23 +58,23 @@ use super::tracker::{Accepted, DesignateInput, GateInput, LocateInput, Sighting,
 use crate::gate::{Gate, GateKind};
 use sightline_vision::registration::Region;
 
-/// The rock is measured on the surface this far around the target, m.
+/// The rock is measured on the surface within this distance of the target, m.
 const MEASURED_WITHIN_M: f64 = 0.9;
-/// Half the width of what cannot be measured, m (R200).
+/// Half width of a rock that cannot be measured, m (R200).
 const HALF_WIDTH_M: f64 = 0.25;
 
-/// The target by the shape of its surroundings at every stop (Deans et al. 2005).
+/// Locates the target by the shape of its surroundings at every stop (Deans et al. 2005).
 #[derive(Clone, Copy, Debug)]
 pub struct ShapeTracker;
 
-/// Features on the way, the shape at the end (Deans et al. 2005, D§4).
+/// Locates the target by features during the drive and by the shape at the end (Deans et al. 2005, D§4).
 #[derive(Clone, Copy, Debug)]
 pub struct CombinedTracker;
 
 /// The memory of the combined tracker.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CombinedMemory {
-    /// The stops from which a motion may be measured.
+    /// The stops from which a motion can be measured.
     pub features: Anchors,
     /// The views that later stops are registered to.
     pub views: Views,
@@ -182,7 +182,7 @@ impl Tracker for CombinedTracker {
     }
 }
 
-/// The views with that of this stop, where its surface was measured.
+/// Adds the view of this stop if its surface was measured.
 fn remembered(views: Views, evidence: &ShapeEvidence) -> Views {
     match &evidence.view {
         Some(view) => views.with(Arc::clone(view)),
@@ -241,7 +241,7 @@ fn first_view(input: &DesignateInput<'_>, located: &Sighting<ShapeEvidence>, evi
     }));
 }
 
-/// The target at a later stop, by the shape where `asked` says why, else by what the features say.
+/// Locates the target at a later stop: by the shape if `asked` is the reason to do so, otherwise by the features.
 fn locate(
     input: &LocateInput<'_>,
     views: &Views,
@@ -265,7 +265,7 @@ fn locate(
     let located = match by_shape {
         Some((found, turn)) => {
             if let Some(features) = evidence.features.as_mut() {
-                // Features that had lost the target are measured from here again.
+                // The features continue from the registered position, even if they had lost the target.
                 let now_from_first = features.carried.map_or(turn, |carried| carried.now_from_first);
                 let renewed = found.position_in_rover.zip(found.covariance_in_rover);
                 features.carried = renewed.map(|(position, covariance)| Carried {

@@ -1,11 +1,11 @@
-//! What the arm is told at the end: whether the target can be reached, and the nearest point that can be touched (R146).
+//! The instrument-placement target: whether the arm can reach it, and the nearest point that it can touch (R146).
 //!
 //! ```text
-//! reachable    r_min ≤ │x − s│ ≤ r_max  and  the target lies ahead of the shoulder
+//! reachable    r_min ≤ │x − s│ ≤ r_max  and  the target is ahead of the shoulder
 //! touchable    no vertex of the mesh within r − ε of  p + n (r + ε)         a ball of the instrument's radius at p
 //! ```
-//! A point in a notch can be seen and yet not be touched by something 5 cm wide; the arm then takes the nearest one that
-//! can (R145: 8 mm away). Arm kinematics are not modelled: a shell about the shoulder stands for the work space.
+//! A point in a notch may be visible but not touchable by an instrument 5 cm wide; the arm then uses the nearest
+//! touchable point (R145: 8 mm away). Arm kinematics are not modelled: the work space is a shell about the shoulder.
 //!
 //! | symbol | our name | unit, frame |
 //! |---|---|---|
@@ -25,36 +25,36 @@ use sightline_geometry::frames::{Point3, Vector3};
 use sightline_record::{Declaration, Record, Unit};
 use sightline_vision::registration::Mesh;
 
-/// Where the arm begins: at the front edge, 0.5 m above flat ground.
+/// Position of the shoulder, m: at the front edge, 0.5 m above flat ground.
 pub const SHOULDER_IN_ROVER: [f64; 3] = [0.6, 0.0, -0.2];
-/// The nearest and the farthest that it reaches, m.
+/// Smallest and largest reach from the shoulder, m.
 pub const REACH_M: [f64; 2] = [0.2, 1.1];
-/// Half the width of what touches, m.
+/// Radius of the instrument, m.
 pub const INSTRUMENT_RADIUS_M: f64 = 0.025;
 
-/// Touching points are looked for this far from the target, m.
+/// Touchable points are searched within this distance of the target, m.
 const NEAR_M: f64 = 0.15;
-/// The normal is a mean over this distance, m.
+/// The normal is averaged within this distance, m.
 const NORMAL_M: f64 = 0.03;
-/// What the surface may be off by, m.
+/// Assumed error of the surface, m.
 const SLACK_M: f64 = 0.005;
 
-/// What the arm is told.
+/// The instrument-placement target.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Placement {
-    /// From the shoulder to the target, m.
+    /// Distance from the shoulder to the target, m.
     pub reach_m: f64,
     /// Whether the arm reaches the target from here.
     pub is_reachable: bool,
-    /// The nearest point of the surface that can be touched, m, rover frame; null where none is within 15 cm.
+    /// The nearest point of the surface that can be touched, m, rover frame; null if none is within 15 cm.
     pub touch_in_rover: Option<[f64; 3]>,
-    /// How far that is from the target, m.
+    /// Distance of that point from the target, m.
     pub offset_m: Option<f64>,
-    /// The direction from which it is touched, rover frame.
+    /// Unit vector in which the arm approaches that point, rover frame.
     pub approach_in_rover: Option<[f64; 3]>,
 }
 
-/// What the arm is told about a target on a surface; both in the rover frame.
+/// Computes the placement for a target on a surface, both in the rover frame.
 pub fn placement(surface: &Mesh, target: &Point3) -> Placement {
     let shoulder = NalgebraPoint3::from(SHOULDER_IN_ROVER);
     let reach_m = (target - shoulder).norm();
@@ -68,7 +68,7 @@ pub fn placement(surface: &Mesh, target: &Point3) -> Placement {
     }
 }
 
-/// The nearest point that can be touched, and the normal there.
+/// Returns the nearest touchable point and the outward normal there.
 fn touch(surface: &Mesh, target: &Point3) -> Option<(Point3, Vector3)> {
     let mut near: Vec<&Point3> =
         surface.vertices.iter().filter(|vertex| (*vertex - target).norm() < NEAR_M).collect();
@@ -82,7 +82,7 @@ fn touch(surface: &Mesh, target: &Point3) -> Option<(Point3, Vector3)> {
     })
 }
 
-/// Whether a ball that touches the surface at a point touches it nowhere else.
+/// Whether a ball at a point of the surface touches it nowhere else.
 fn is_free(surface: &Mesh, point: &Point3, outwards: &Vector3) -> bool {
     let centre = point + outwards * (INSTRUMENT_RADIUS_M + SLACK_M);
     surface.vertices.iter().all(|vertex| (vertex - centre).norm() > INSTRUMENT_RADIUS_M - SLACK_M)
@@ -109,7 +109,7 @@ mod tests {
     use super::*;
     use sightline_vision::registration::{MeshSettings, PointGrid};
 
-    /// A wall 1.3 m ahead, 1 mm between points across ±6 cm, with a groove along z at y = 0 that is `half_m` to each side wide and
+    /// A wall 1.3 m ahead, sampled every 1 mm across ±6 cm, with a groove along z at y = 0, `half_m` to each side and
     /// 3 cm deep.
     fn wall(half_m: f64) -> Mesh {
         let mut grid = PointGrid::empty(121, 121);

@@ -1,15 +1,15 @@
-//! One stop registered to an earlier view: where that begins, the surfaces, the ray or the picture, and what is kept of it.
+//! Registers one stop to an earlier view: the start, the surfaces, the ray or the draped image, and the evidence.
 //!
-//! | begins by | position | attitude | how well that is known |
+//! | start | position | attitude | uncertainty |
 //! |---|---|---|---|
-//! | features that are sure | theirs | turned as their motions say | their covariance, 0.2° |
+//! | features of sufficient confidence | by the features | rotation by their motions | their covariance, 0.2° |
 //! | dead reckoning | the prediction | by the pose estimates | its covariance and half the basin, `shape_attitude_deg` |
-//! | a hand-off, registered to the stop before | the target's | by the pose estimates | `hand_off_shift_m`, `hand_off_turn_deg` |
-//! | a hand-off of a tracked target, registered to the first view | the target's | by the pose estimates | what its covariance has beyond that view's, and `hand_off_shift_m`; `shape_attitude_deg` |
+//! | a hand-off, registered to the previous stop | the target's | by the pose estimates | `hand_off_shift_m`, `hand_off_turn_deg` |
+//! | a hand-off of a tracked target, registered to the first view | the target's | by the pose estimates | its covariance beyond that view's, and `hand_off_shift_m`; `shape_attitude_deg` |
 //!
-//! At a hand-off the rover stands still. The surface of the stop before is there where that stop was registered itself.
+//! The rover does not move at a hand-off. The surface of the previous stop exists if that stop was registered.
 //!
-//! Source: R189, R197, R205; what is known of the start is ours.
+//! Source: R189, R197, R205; the uncertainties of the start are ours.
 
 use std::sync::Arc;
 
@@ -28,18 +28,18 @@ use sightline_vision::registration::{
     Failure, Mesh, Prior, Registration, RegistrationInput, ShapeSettings, register,
 };
 
-/// Attitude since the designation as the features carry it, 1σ about each axis, deg: several times what they err by.
+/// 1σ about each axis of the attitude since the designation by the features, deg: several times their error.
 const FEATURES_ATTITUDE_DEG: f64 = 0.2;
 
-/// The target by registration, and how the rover frame turned since the view; none where that is not to be used, and why is in
-/// the evidence.
+/// Returns the target by registration, and the rotation of the rover frame since the view. `None` if it is not used;
+/// the reason is in the evidence.
 pub(super) fn by_shape(
     input: &LocateInput<'_>,
     views: &Views,
     base: &Sighting<ShapeEvidence>,
     evidence: &mut ShapeEvidence,
 ) -> Option<(Sighting<ShapeEvidence>, UnitQuaternion<f64>)> {
-    // A target that the stop before did not find may be anywhere: it is looked for by its first view, like any lost one.
+    // A target not located at the previous stop may be anywhere: it is registered to its first view, like any lost one.
     let is_of_the_stop_before = views.last.as_ref().is_some_and(|last| last.step + 1 == input.place.step);
     let is_hand_off = input.place.is_hand_over && is_of_the_stop_before;
     let Some(view) = (if is_hand_off { &views.last } else { &views.first }) else {
@@ -64,7 +64,7 @@ pub(super) fn by_shape(
     if let Some(target) = &target {
         registered.correction_m = Some((target.position - tried.expected).norm());
         registered.ray = target.ray;
-        // The rover stands as at the view of the stop before, whose surface is the finer one.
+        // The rover has not moved since the view of the previous stop, whose surface is the finer one.
         let there = found.fixed_from_moving * target.position;
         evidence.placement = match is_hand_off {
             true => Some(placement(&view.mesh, &there)),
@@ -89,7 +89,7 @@ pub(super) fn by_shape(
     Some((sighting, found.fixed_from_moving.rotation.inverse()))
 }
 
-/// The view of this stop, kept with the position that the stop ends with.
+/// The view of this stop with the expected target; `locate` replaces its position and covariance by the final ones.
 fn present_view(input: &LocateInput<'_>, half_width_m: f64, (expected, mesh): (Point3, Mesh)) -> View {
     View {
         step: input.place.step,
@@ -104,19 +104,19 @@ fn present_view(input: &LocateInput<'_>, half_width_m: f64, (expected, mesh): (P
     }
 }
 
-/// A registration with an earlier view, whether it is to be used or not.
+/// A registration with an earlier view, used or not.
 struct Tried {
     found: Registration,
-    /// The present surface.
+    /// The current surface.
     mesh: Mesh,
-    /// Where the target was thought to be.
+    /// The expected target, m, current rover frame.
     expected: Point3,
     settings: ShapeSettings,
 }
 
 impl Tried {
     /// # Errors
-    /// A sentence where the stop shows no surface.
+    /// If the stop has too little surface.
     fn new(
         input: &LocateInput<'_>,
         base: &Sighting<ShapeEvidence>,
@@ -156,18 +156,18 @@ impl Tried {
     }
 }
 
-/// Where the target is thought to be before it is registered.
+/// The expected target before the registration.
 struct Start {
-    /// Position, m, present rover frame.
+    /// Position, m, current rover frame.
     position: Point3,
-    /// How the present rover frame is turned in that of the earlier view.
+    /// Rotation from the current rover frame to that of the earlier view.
     fixed_from_moving: UnitQuaternion<f64>,
-    /// How well both are known.
+    /// Uncertainty of both.
     prior: Prior,
 }
 
 impl Start {
-    /// By the features where they are sure, else by dead reckoning; where cameras change, by the rover that stands still.
+    /// By the features if their confidence suffices, else by dead reckoning; at a hand-off, by the rover not moving.
     fn new(
         input: &LocateInput<'_>,
         base: &Sighting<ShapeEvidence>,
@@ -177,7 +177,7 @@ impl Start {
     ) -> Self {
         let settings = &input.settings.shape;
         let prediction = input.prediction;
-        // Wheels slip and gyros jump by more than their model says; beyond the basin nothing would be found anyway (R155).
+        // Wheel slip and gyro errors exceed their model; beyond the basin the registration would fail anyway (R155).
         let basin_m2 = (view.half_width_m / 2.0).powi(2);
         let by_poses = view.turn_to(input.site_from_rover);
         if is_hand_off {
@@ -213,7 +213,7 @@ impl Start {
     }
 }
 
-/// The covariance that a target has beyond that of its view, m²: both have the error of the designation in common.
+/// Returns the target's covariance beyond that of its view, m²: both include the error of the designation.
 fn added_since(
     view: &View,
     fixed_from_moving: &UnitQuaternion<f64>,
@@ -226,7 +226,7 @@ fn added_since(
     axes * Matrix3::from_diagonal(&added.eigenvalues.map(|variance| variance.max(0.0))) * axes.transpose()
 }
 
-/// Whether a picture may decide: the surfaces fit, though they may let the target slide.
+/// Whether a draped image may decide: the surfaces match, but may let the target slide.
 const fn is_left_to_the_picture(failure: Option<&Failure>) -> bool {
     matches!(
         failure,
@@ -236,7 +236,7 @@ const fn is_left_to_the_picture(failure: Option<&Failure>) -> bool {
     )
 }
 
-/// The target in the present image by the earlier one draped over the surface; none where it is not found.
+/// Locates the target by the earlier image, draped over the surface and matched in the current one; `None` if that fails.
 fn by_picture(
     input: &LocateInput<'_>,
     view: &View,
@@ -274,20 +274,20 @@ fn by_picture(
     }
 }
 
-/// The covariance that the target had in the earlier view, turned into the present rover frame, m².
+/// The target's covariance in the earlier view, rotated into the current rover frame, m².
 fn view_covariance(found: &Registration, view: &View) -> Matrix3<f64> {
     let turn = found.fixed_from_moving.rotation.inverse().to_rotation_matrix();
     turn.matrix() * view.covariance_in_rover * turn.matrix().transpose()
 }
 
-/// A target that a registration carried here.
+/// A target located by a registration.
 struct CarriedTarget {
     position: Point3,
     covariance: Matrix3<f64>,
     ray: Option<carried_ray::RayMeeting>,
 }
 
-/// The target in the present rover frame; none where the registration has no covariance.
+/// The target in the current rover frame; `None` if the registration has no covariance.
 fn carried(found: &Registration, view: &View, mesh: &Mesh, with_ray: bool) -> Option<CarriedTarget> {
     let covariance = found.covariance_in_moving? + view_covariance(found, view);
     let registered = found.target_in_moving;
@@ -305,7 +305,7 @@ fn carried(found: &Registration, view: &View, mesh: &Mesh, with_ray: bool) -> Op
     }))
 }
 
-/// A registration in numbers.
+/// Summarises a registration for the evidence.
 fn registered(
     found: &Registration,
     view: &View,

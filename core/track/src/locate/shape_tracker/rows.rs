@@ -1,7 +1,7 @@
-//! The tables of the shape tracker, read row by row, and what follows from its numbers alone: what page and recording
-//! draw (R155, R200–R203).
+//! The tables of the shape tracker, read row by row, and quantities derived from its numbers alone, for the page and
+//! the recording (R155, R200–R203).
 //!
-//! They come from the trace or, as arrays, over the network; both hold the same numbers. Frame of points: present rover, m.
+//! They are read from the trace or, as arrays, from the network, with the same numbers. Points: current rover frame, m.
 
 use nalgebra::Matrix2;
 
@@ -13,22 +13,22 @@ use sightline_geometry::frames::{Pixel, Point3, Vector3};
 /// A step of the refinement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathStep {
-    /// Values of the objective that were computed so far.
+    /// Number of evaluations of the objective so far.
     pub evaluations: u32,
-    /// Which run of the refinement it belongs to, from 0: the simplex is restarted.
+    /// Run of the refinement, from 0; the simplex is restarted for each run.
     pub run: u32,
     /// J: mean distance of the surfaces, m.
     pub mean_m: f64,
-    /// How far the moving surface was shifted from its start, m, along the axes of the sensor.
+    /// Shift of the moving surface from its start, m, along the axes of the sensor.
     pub shift_m: [f64; 3],
-    /// How far it was turned, rad, about the same axes.
+    /// Rotation of the moving surface from its start, rad, about the same axes.
     pub turn_rad: [f64; 3],
 }
 
 /// The corners of a facet, m.
 pub type Facet = [[f32; 3]; 3];
 
-/// The steps of a refinement's values.
+/// Reads the steps of a refinement from its values.
 pub fn path(values: &[f32]) -> impl Iterator<Item = PathStep> {
     values.chunks_exact(PATH_COLUMNS).map(|row| {
         let three = |first: usize| [row[first], row[first + 1], row[first + 2]].map(f64::from);
@@ -42,7 +42,7 @@ pub fn path(values: &[f32]) -> impl Iterator<Item = PathStep> {
     })
 }
 
-/// The facets of a mesh's values.
+/// Reads the facets of a mesh from its values.
 pub fn facets(values: &[f32]) -> impl Iterator<Item = Facet> {
     values.chunks_exact(MESH_COLUMNS).map(|row| {
         let corner = |first: usize| [row[first], row[first + 1], row[first + 2]];
@@ -51,7 +51,7 @@ pub fn facets(values: &[f32]) -> impl Iterator<Item = Facet> {
 }
 
 /// The covariance in the left image of a target that the shape tracker registered, px²: `J Σ Jᵀ` with the camera's
-/// derivative at the target; none where it was not registered.
+/// Jacobian at the target; `None` if it was not registered.
 pub fn registered_covariance_px2(located: &Located, left: &Camera) -> Option<Matrix2<f64>> {
     located.evidence.shape()?.registration.as_ref()?;
     let (_, jacobian) = left.model.project_with_jacobian(located.position_in_rover.as_ref()?)?;
@@ -59,8 +59,7 @@ pub fn registered_covariance_px2(located: &Located, left: &Camera) -> Option<Mat
 }
 
 /// The outline in an image of a ball about a point of the rover frame (m), as a circle across the line of sight: the
-/// basin of the registration, whose radius is the rock's half width (R155). Empty where a part is not in front of the
-/// camera.
+/// basin of the registration, whose radius is the rock's half width (R155). Empty if any of it is behind the camera.
 pub fn basin(centre: &Point3, half_width_m: f64, camera: &Camera) -> Vec<Pixel> {
     const POINTS: usize = 48;
     let sight = centre - camera.model.centre();
@@ -74,7 +73,7 @@ pub fn basin(centre: &Point3, half_width_m: f64, camera: &Camera) -> Vec<Pixel> 
     (0..POINTS).map(place).collect::<Option<Vec<_>>>().unwrap_or_default()
 }
 
-/// Side of a pixel of the virtual sensor, and with it a step of the coarse search, m; `columns` are those of the sensor.
+/// Side of a pixel of the virtual sensor, which is a step of the coarse search, m; `columns`: width of the sensor, px.
 pub fn sensor_pixel_m(registered: &Registered, columns: u32) -> Option<f64> {
     Some(registered.sensor_side_m? / f64::from(columns.max(1)))
 }

@@ -8,24 +8,24 @@ use crate::settings_group;
 use sightline_vision::registration::{CheckSettings, MeshSettings, Method, ShapeSettings};
 use sightline_vision::stereo::{StereoMethod, StereoSettings};
 
-/// At which stops the target is found by the shape of its surroundings.
+/// Stops at which the target is located by the shape of its surroundings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ShapeUse {
-    /// At the last stop of a camera pair, and where another pair takes over.
+    /// At the last stop of a camera pair, and at a hand-off.
     #[default]
     AtEnd,
-    /// There, and wherever the features lose the target.
+    /// As `at_end`, and at every stop where the features lose the target.
     WhenLost,
     /// At every stop.
     EveryStop,
 }
 
-/// What the cameras of two pairs may disagree by, and the least that the coarse search covers, m.
+/// Reach of the coarse search beyond 3σ of the prior, m; covers the disagreement of two camera pairs.
 const SEARCH_LEAST_M: f64 = 0.04;
 
 settings_group! {
-    /// How a target is found by the shape of its surroundings (Deans et al. 2005).
+    /// How a target is located by the shape of its surroundings (Deans et al. 2005).
     ShapeTrackerSettings as "shape" {
         /// Stops at which the combined tracker registers the shape; the shape tracker registers it at every stop.
         shape_use: ShapeUse = ShapeUse::AtEnd, "", Domain::choice(&["at_end", "when_lost", "every_stop"]), "Deans05 §4", if tracker = "combined";
@@ -87,17 +87,17 @@ settings_group! {
 }
 
 impl ShapeTrackerSettings {
-    /// How surfaces are measured around a target at a distance.
+    /// The settings of dense stereo for a target at a distance.
     ///
-    /// Disparities nearer than the target's surroundings only cost time. Limits go in halves, so that targets at similar
-    /// distances share their surfaces.
+    /// Disparities nearer than the target's surroundings only cost time. The range limit is rounded down to a power
+    /// of two, so that targets at similar distances share their surfaces.
     pub fn stereo(&self, distance_m: f64) -> StereoSettings {
         let nearest_m = (0.3 * distance_m).max(0.01);
         let range_min_m = 2f64.powf(nearest_m.log2().floor()).max(self.surface_range_min_m);
         StereoSettings { method: self.surface_method, range_min_m, ..StereoSettings::default() }
     }
 
-    /// How far the coarse search goes where the start is known to `sigma_m`, m.
+    /// Reach of the coarse search to each side, m, for a start with a standard deviation of `sigma_m`.
     pub fn search_m(&self, sigma_m: f64, half_width_m: f64) -> f64 {
         if self.shape_search_m > 0.0 {
             self.shape_search_m
@@ -106,7 +106,7 @@ impl ShapeTrackerSettings {
         }
     }
 
-    /// How they are registered.
+    /// The settings of the registration.
     pub fn registration(&self) -> ShapeSettings {
         let defaults = ShapeSettings::default();
         ShapeSettings {

@@ -1,7 +1,7 @@
-//! The surface that the pair of a stop shows, and the mesh of the part of it around a target (R187, R188).
+//! The surface of a stop by dense stereo, and the mesh of its part around a target (R187, R188).
 //!
 //! ```text
-//! σ_r = σ_d r / d         1σ of a point along its line of sight: a disparity is known to σ_d
+//! σ_r = σ_d r / d         1σ of a point along its line of sight, for a disparity noise of σ_d
 //! ```
 //! | symbol | our name | unit |
 //! |---|---|---|
@@ -9,8 +9,8 @@
 //! | σ_d | `surface_sigma_px` | px |
 //! | r | distance from the left camera | m |
 //!
-//! Dense stereo is of the whole image and shared by all targets; only what lies around a target becomes a mesh, since
-//! nothing else is compared. Frame: rover, m.
+//! Dense stereo covers the whole image and is shared by all targets; only the surroundings of a target become a mesh,
+//! since nothing else is compared. Frame: rover, m.
 //!
 //! Source: D§2 "3D shape based tracker"; domain.md 3.4 for the noise.
 
@@ -31,10 +31,10 @@ use sightline_record::{Declaration, Record, Unit};
 use sightline_vision::registration::{Mesh, MeshSettings, PointGrid, Region};
 use sightline_vision::stereo::{Alignment, DisparityMap, Outcome, StereoSettings, dense_stereo_until};
 
-/// Longest side of the disparities and ranges that are shown.
+/// Largest side of the disparities and ranges that are shown, px.
 const SHOWN_PX: usize = 512;
 
-/// Stops whose surfaces the store keeps: a dozen megabytes each.
+/// Number of stops whose surfaces the store keeps: a dozen megabytes each.
 const SURFACES_KEPT: usize = 3;
 
 /// The surface of a stop.
@@ -44,29 +44,29 @@ pub struct StopSurface {
     pub alignment: Alignment,
     /// The disparities of the aligned left image.
     pub disparities: DisparityMap,
-    /// For each of its pixels the point, m, rover frame; NaN where there is none.
+    /// The point of each of its pixels, m, rover frame; NaN without a disparity.
     pub points_m: Vec<[f32; 3]>,
-    /// From where they are seen: the left camera, m, rover frame.
+    /// Position of the left camera, m, rover frame.
     pub viewpoint: Point3,
 }
 
-/// What dense stereo made of a pair, in numbers.
+/// The result of dense stereo in numbers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct SurfaceSeen {
     /// Size of the aligned left image, px.
     pub size: [u32; 2],
-    /// Pixels by what became of them: found, outside, without texture, not unique, not confirmed by the right image, in too
-    /// small a patch, out of range.
+    /// Number of pixels per outcome: found, outside, without texture, not unique, not confirmed by the right image,
+    /// in too small a patch, out of range.
     pub pixels: [usize; 7],
-    /// Vertices of the mesh around the target.
+    /// Number of vertices of the mesh around the target.
     pub vertices: usize,
-    /// Its triangles.
+    /// Number of its triangles.
     pub triangles: usize,
-    /// Points of a block's side that became one vertex.
+    /// Points per side of the block that became one vertex.
     pub stride: usize,
-    /// What that lost, rms, m; the noise of the points is in it.
+    /// RMS error of the mesh at the points, m; includes the noise of the points.
     pub detail_rms_m: f64,
-    /// Every so many pixels and rows of the disparities are shown.
+    /// Step in pixels and rows at which the disparities are shown.
     pub shown_every: usize,
 }
 
@@ -78,7 +78,7 @@ impl HeapBytes for StopSurface {
 }
 
 impl StopSurface {
-    /// The surface of a stop, from the store where it was measured before.
+    /// Returns the surface of a stop, from the store if it was measured before.
     ///
     /// # Errors
     /// As [`StopSurface::measure`].
@@ -92,7 +92,7 @@ impl StopSurface {
         store::shared(shared, settings, SURFACES_KEPT, || Self::measure(pair, cameras, settings, cancel))
     }
 
-    /// The surface that a pair shows.
+    /// Measures the surface of a pair by dense stereo.
     ///
     /// # Errors
     /// As [`dense_stereo_until`].
@@ -111,7 +111,7 @@ impl StopSurface {
         })
     }
 
-    /// The mesh of what lies within a region.
+    /// Returns the mesh of the surface within a region.
     pub fn mesh(&self, region: &Region, settings: &ShapeTrackerSettings) -> Mesh {
         let grid = self.grid(region, settings.surface_sigma_px);
         let own = settings.registration().mesh;
@@ -119,13 +119,13 @@ impl StopSurface {
         Mesh::from_grid(&grid, &self.viewpoint, Some(region), &MeshSettings { spacing_m, ..own })
     }
 
-    /// 1σ of the range of a point in the middle of a region, m: facets that are smaller than that are all slope.
+    /// 1σ of the range of a point in the middle of a region, m: noise dominates the slope of smaller facets.
     fn range_sigma_m(&self, region: &Region, sigma_px: f64) -> f64 {
         let distance_m = (region.centre - self.viewpoint).norm();
         sigma_px * distance_m / self.alignment.disparity_px(distance_m)
     }
 
-    /// The points of the smallest part of the picture that holds a region.
+    /// The points of the smallest part of the image that contains a region.
     fn grid(&self, region: &Region, sigma_px: f64) -> PointGrid {
         let width = self.disparities.width as usize;
         let (centre, radius) = (region.centre.coords.map(|value| value as f32), region.radius_m as f32);
@@ -135,7 +135,7 @@ impl StopSurface {
         };
         let (mut first, mut last) = ([usize::MAX; 2], [0; 2]);
         for (number, point) in self.points_m.iter().enumerate() {
-            // What is not a number is not inside.
+            // NaN is not inside.
             if is_inside(point) {
                 let at = [number % width, number / width];
                 for axis in 0..2 {
@@ -165,7 +165,7 @@ impl StopSurface {
         grid
     }
 
-    /// The numbers, with those of the mesh around the target.
+    /// Summarises the surface and the mesh around the target.
     pub fn seen(&self, mesh: &Mesh) -> SurfaceSeen {
         use Outcome::{Found, LeftRight, NoTexture, NotUnique, OutOfRange, Outside, Speckle};
         let kinds = [Found, Outside, NoTexture, NotUnique, LeftRight, Speckle, OutOfRange];
@@ -184,12 +184,12 @@ impl StopSurface {
         (self.disparities.width.max(self.disparities.height) as usize).div_ceil(SHOWN_PX).max(1)
     }
 
-    /// The disparities, px, thinned for showing; NaN where there is none.
+    /// The disparities, px, subsampled for display; NaN if missing.
     pub fn shown_disparities(&self) -> Table {
         self.shown(|number| self.disparities.disparity_px[number])
     }
 
-    /// The distances from the left camera, m, thinned alike.
+    /// The distances from the left camera, m, subsampled in the same way.
     pub fn shown_ranges(&self) -> Table {
         let from = self.viewpoint.coords.map(|value| value as f32);
         self.shown(|number| {

@@ -1,7 +1,7 @@
-//! A target as one stop saw it: its surface, where it is on that, and the line of sight to it.
+//! A target as seen at one stop: its surface, its position on it, and the line of sight to it.
 //!
-//! Every later stop is registered to the *first* view, so that errors do not add up (R189); where other cameras take
-//! over, theirs is registered to the last view of the old ones (R205), which is the nearest and the sharpest.
+//! Every later stop is registered to the *first* view, so that errors do not accumulate (R189). At a hand-off the new
+//! pair is registered to the last view of the old one (R205), which is the nearest and the sharpest.
 
 use std::sync::Arc;
 
@@ -13,54 +13,55 @@ use sightline_geometry::frames::{Point3, Pose, Ray};
 use sightline_vision::image::GrayImage;
 use sightline_vision::registration::Mesh;
 
-/// A target as one stop saw it.
+/// A target as seen at one stop.
 ///
-/// Serialised, mesh, image and ray are left out: they follow from the images of that stop, its camera and the designation.
+/// Mesh, image and ray are not serialised: they follow from the images of that stop, its camera and the designation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct View {
-    /// The stop.
+    /// The step.
     pub step: usize,
-    /// The estimated pose there.
+    /// The estimated rover pose at that stop.
     pub site_from_rover: Pose,
-    /// Where the target was, m, rover frame of that stop.
+    /// Position of the target, m, rover frame of that stop.
     pub position_in_rover: Point3,
-    /// The covariance of that, m².
+    /// Its covariance, m².
     pub covariance_in_rover: Matrix3<f64>,
-    /// The line of sight of the designated pixel; at the designation only.
+    /// The line of sight of the designated pixel; `None` at later stops.
     #[serde(skip)]
     pub ray: Option<Ray>,
-    /// Half the width of what is to be recognised, m.
+    /// Half the width of the surface to be registered, m.
     pub half_width_m: f64,
     /// The surface around the target, m, rover frame of that stop.
     #[serde(skip)]
     pub mesh: Mesh,
     /// The left camera, rover frame.
     pub left: Camera,
-    /// Its image.
+    /// The left image.
     #[serde(skip)]
     pub image: Arc<GrayImage>,
 }
 
 impl View {
-    /// How the rover frame of another stop is turned in that of this view, by the pose estimates.
+    /// Rotation from the rover frame of another stop to that of this view, by the pose estimates.
     pub fn turn_to(&self, site_from_rover: &Pose) -> UnitQuaternion<f64> {
         self.site_from_rover.rotation.inverse() * site_from_rover.rotation
     }
 
-    /// Where a registration with this view starts: turned like that, with the target where it is thought to be now.
+    /// Start of a registration with this view: the given rotation, and the shift that moves `position_in_rover` to
+    /// the target.
     pub fn start_from(&self, rotation: UnitQuaternion<f64>, position_in_rover: &Point3) -> Pose {
         let shift = self.position_in_rover - rotation * position_in_rover;
         Pose::from_parts(shift.into(), rotation)
     }
 }
 
-/// The views of a target that later stops are registered to.
+/// The views to which later stops are registered.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Views {
-    /// Of the designation.
+    /// The view of the designation.
     #[serde(with = "by_value")]
     pub first: Option<Arc<View>>,
-    /// Of the last stop whose surface was measured.
+    /// The view of the last stop whose surface was measured.
     #[serde(with = "by_value")]
     pub last: Option<Arc<View>>,
 }
@@ -86,7 +87,7 @@ mod by_value {
 }
 
 impl Views {
-    /// These views with one that is newer than all of them.
+    /// Adds a view that is newer than all of them.
     #[must_use]
     pub fn with(mut self, view: Arc<View>) -> Self {
         self.first.get_or_insert_with(|| Arc::clone(&view));
@@ -125,7 +126,7 @@ mod tests {
         let start = view.start_from(view.turn_to(&now), &thought);
         assert!((start * thought - view.position_in_rover).norm() < 1e-12);
         assert!(start.rotation.angle_to(&(then.inverse() * now).rotation) < 1e-12);
-        // With poses and position that agree it is the motion itself.
+        // With consistent poses and position, the start is the motion itself.
         let exact = view.start_from(view.turn_to(&now), &((now.inverse() * then) * view.position_in_rover));
         assert!((exact.translation.vector - (then.inverse() * now).translation.vector).norm() < 1e-12);
     }

@@ -1,12 +1,12 @@
 //! The second stage: an affine map by gradient descent from the first stage's match (R221, R222).
 //!
-//! The sum of squared differences over six affine parameters is minimised by Gauss–Newton, coarse to fine, with gain and
-//! level solved for together with each step (`correlate::lucas_kanade`): the first stage is blind to them, and a second one
-//! that is not would be pulled by the change of light between two stops. The window shows the same part of the scene
-//! at every level.
+//! The sum of squared differences over six affine parameters is minimised by Gauss–Newton, coarse to fine, with gain
+//! and offset estimated in each step (`correlate::lucas_kanade`): the first stage is invariant to them, and a change
+//! of light between two stops would bias a second stage that is not. The window covers the same part of the scene at
+//! every pyramid level.
 //!
-//! The map is rejected, and the first stage's match stands, when it moves the match by more than `refine_max_shift_px`
-//! or changes the window's area by more than `refine_max_area_change`; the record says so.
+//! The map is rejected, with the reason in the record, if it moves the match by more than `refine_max_shift_px` or
+//! changes the window's area by more than `refine_max_area_change`; the first stage's match is then kept.
 
 use nalgebra::Matrix2;
 use serde::{Deserialize, Serialize};
@@ -20,28 +20,28 @@ use sightline_geometry::frames::Pixel;
 use sightline_vision::correlate::lucas_kanade::{Descend, Footprint, Placed, descend};
 use sightline_vision::image::GrayImage;
 
-/// What the second stage found.
+/// The result of the second stage.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct AffineRefinement {
-    /// Where it put the match, px.
+    /// Position of the match, px.
     pub pixel: Pixel,
-    /// How offsets from the template's middle map into the image, px per px.
+    /// Maps offsets from the template's centre into the image, px per px.
     #[schema(value_type = Vec<f64>)]
     pub map: Matrix2<f64>,
-    /// How far it moved the match, px.
+    /// Distance from the first stage's match, px.
     pub shift_px: f64,
-    /// By what share it changed the window's area.
+    /// Relative change of the window's area.
     pub area_change: f64,
-    /// Steps taken, over all levels.
+    /// Number of steps, over all levels.
     pub iterations: u32,
-    /// Whether it is used.
+    /// Whether the match is used.
     pub accepted: bool,
-    /// Why not, as one sentence.
+    /// Reason for the rejection, as one sentence; null if accepted.
     pub rejected: Option<String>,
 }
 
 impl AffineRefinement {
-    /// The place it found.
+    /// The placement of the window.
     pub(super) fn placed(&self) -> Placed {
         Placed { centre: self.pixel, map: self.map, iterations: self.iterations, residual: 0.0 }
     }

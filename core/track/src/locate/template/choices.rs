@@ -1,20 +1,20 @@
-//! The words that the choices among the template locator's settings take.
+//! The enumerated values of the template locator's settings.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// What the roll of the template is measured against (Kim09 §4.3.1).
+/// Reference direction of the template's roll (Kim09 §4.3.1).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RollReference {
     /// The horizontal of the old image, taken as exactly horizontal, as the paper does.
     #[default]
     Horizontal,
-    /// The helper point's true direction in the old image, which distortion tilts a little.
+    /// The helper point's true direction in the old image, slightly tilted by distortion.
     OldImage,
 }
 
-/// From where the vertical tolerance of point stereo is measured (Kim09 §4.4).
+/// Reference of the vertical tolerance of point stereo (Kim09 §4.4).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum StereoReference {
@@ -25,7 +25,7 @@ pub enum StereoReference {
     ImageRow,
 }
 
-/// Where the interval of disparities lies (Kim09 §4.4, corrected).
+/// Position of the interval of disparities (Kim09 §4.4, corrected).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum DisparityInterval {
@@ -42,41 +42,40 @@ pub enum DisparityInterval {
 pub enum TemplateUpdate {
     /// At every accepted update, as in flight.
     EveryUpdate,
-    /// Once it must be magnified too much, or matches badly: errors of matches are chained more seldom.
+    /// If its magnification is too large or its score too low, so that fewer match errors accumulate.
     #[default]
     OnCondition,
-    /// Never: the designated window is looked for at every stop.
+    /// Never: the designated window is matched at every stop.
     Never,
-    /// At every accepted update, and every match is then corrected against the designated window, where that is found
-    /// near it.
+    /// At every accepted update; every match is then corrected against the designated window, if that is found near it.
     DriftCorrected,
 }
 
-/// Where the pixel noise comes from that the position covariance propagates.
+/// Source of the pixel noise in the position covariance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum NoiseModel {
     /// Measured from each match: residual, gradients and template drift.
     #[default]
     Measured,
-    /// Half a pixel in each coordinate of each eye, as the papers assume.
+    /// Half a pixel in each coordinate of each camera, as the papers assume.
     HalfPixel,
 }
 
-/// What finds the template first (Kim09 §2).
+/// Method of the first stage (Kim09 §2).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FirstStage {
     /// Comparison at the positions of the search window.
     #[default]
     Correlation,
-    /// Pyramidal Lucas–Kanade from the prediction, by shift alone.
+    /// Pyramidal Lucas–Kanade from the prediction, by translation alone.
     KltTranslation,
-    /// The same by affine map.
+    /// Pyramidal Lucas–Kanade from the prediction, by an affine map.
     KltAffine,
 }
 
-/// By what the template and the image are compared (Kim09 §2).
+/// Similarity measure of template and image (Kim09 §2).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Measure {
@@ -92,7 +91,7 @@ pub enum Measure {
 }
 
 impl Measure {
-    /// Its name, as in the settings.
+    /// The name, as in the settings.
     pub fn word(self) -> &'static str {
         match self {
             Self::Ncc => "ncc",
@@ -102,8 +101,8 @@ impl Measure {
         }
     }
 
-    /// Between what its scores are shown, the same at every step: −1 and 1 where it has these bounds; negated differences
-    /// of a fifth of full scale (squared: of a seventh) up to none.
+    /// Limits between which its scores are shown, the same at every step: −1 and 1 if it has these bounds; otherwise
+    /// negated differences from a fifth of full scale (squared: a seventh) to zero.
     pub fn shown_limits(self) -> [f32; 2] {
         match self {
             Self::Ncc | Self::Sdog => [-1.0, 1.0],
@@ -113,14 +112,14 @@ impl Measure {
     }
 }
 
-/// Which positions are compared (Kim09 §4.3.2).
+/// Positions that are compared (Kim09 §4.3.2).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Search {
-    /// All of them.
+    /// All positions.
     #[default]
     Exhaustive,
-    /// All at a coarse level, and those near the best at finer ones.
+    /// All positions at a coarse level, and those near the best at finer levels.
     CoarseToFine,
 }
 
@@ -128,21 +127,21 @@ pub enum Search {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Refine {
-    /// None: the first stage's match stands.
+    /// None: the first stage's match is final.
     #[default]
     None,
     /// An affine map by gradient descent.
     Affine,
 }
 
-/// Where the template's scale and roll come from (Kim09 §2).
+/// Source of the template's scale and roll (Kim09 §2).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Transform {
     /// The geometry of the two views.
     #[default]
     Geometry,
-    /// Brute force: every pair of a grid is compared, the best score wins.
+    /// Brute force: every pair of a grid is compared; the best score wins.
     Search,
 }
 
@@ -150,7 +149,7 @@ pub enum Transform {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum WarpModel {
-    /// The map of first order at the target.
+    /// The first-order map at the target.
     #[default]
     Slope,
     /// Pixel by pixel through the surface's plane and both camera models.

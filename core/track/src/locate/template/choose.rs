@@ -1,17 +1,17 @@
-//! Which template is matched: the one there is, or the best of several.
+//! Selects the template to match: the current one, or the best of several.
 //!
-//! * `reference_templates`: the template and the appearances that it replaced, newest first. Renewals on condition are some
-//!   way apart, so that these differ in distance and in the line of sight.
-//! * `surface_warp`: each of them warped by the slope of its surface, and scaled and rolled by the geometry. Where the
-//!   window covers two surfaces, such as a rock and the ground before it, the measured slope is that of neither, and the
-//!   warped window matches beside the target, an error that every renewal of the template adds up.
-//! * `transform = search`: for each of them every pair of a scale and a roll from a grid, without the geometry (R224).
-//!   Scales are spaced by a ratio and rolls by a step, both about none.
+//! * `reference_templates`: the current template and those it replaced, newest first. Conditional renewals are some
+//!   distance apart, so that these templates differ in range and in line of sight.
+//! * `surface_warp`: each of them warped by the slope of its surface, and also scaled and rolled by the geometry. If
+//!   the window covers two surfaces, such as a rock and the ground in front of it, the measured slope fits neither,
+//!   and the warped window matches beside the target, an error that accumulates with every renewal.
+//! * `transform = search`: for each of them every pair of a scale and a roll from a grid, without the geometry
+//!   (R224). Scales are spaced by a ratio and rolls by a step, symmetric about the identity.
 //!
-//! Each is matched by the first stage, and the highest score of the measure wins, the first among equals, a match near the
-//! prediction before one far from it that scores little more (`near`). Of matches at the
-//! same place the one with the higher score in focus wins, where there is a focus: it counts the surroundings of the target
-//! most. A match against an older appearance starts from that appearance's drift.
+//! Each is matched by the first stage, and the highest score of the measure wins, the first among equals; a match
+//! near the prediction wins over one far from it with a slightly higher score (`near`). Of matches at the same
+//! position, the one with the higher focused score wins, if there is a focus, which weights the surroundings of the
+//! target most. A match against an older appearance starts from that appearance's drift.
 
 use super::failure::TemplateFailure;
 use super::first_match::FirstMatch;
@@ -24,24 +24,24 @@ use crate::locate::tracker::LocateInput;
 use sightline_geometry::estimate::drift::Drift;
 use sightline_geometry::frames::Pose;
 
-/// Matches whose peaks are at most so far apart, px, are of the same place.
+/// Matches are at the same position if their peaks are at most this far apart, px.
 const SAME_PLACE_PX: f64 = 5.0;
 
-/// The template whose match stands.
+/// The selected template with its match.
 pub(super) struct Chosen<'a> {
     pub(super) prepared: Prepared<'a>,
-    /// Takes points of the rover frame of its stop into the present one.
+    /// Maps the rover frame of its stop to the current one.
     pub(super) now_from_template: Pose,
     pub(super) first: FirstMatch,
-    /// The error of its centre.
+    /// The error of the template's centre.
     pub(super) drift: Drift,
-    /// Every template that was tried, where there was more than one.
+    /// All templates that were tried; empty if there was only one.
     pub(super) tried: Vec<TriedTemplate>,
-    /// Positions compared, all templates together.
+    /// Number of positions compared, over all templates.
     pub(super) comparisons: u64,
 }
 
-/// Why there is no match, with the template that came nearest to one.
+/// Why there is no match, with the first template that failed.
 pub(super) struct Unmatched {
     pub(super) scale_roll: Option<Box<ScaleRoll>>,
     pub(super) missing: TemplateFailure,
@@ -54,18 +54,18 @@ impl Unmatched {
     }
 }
 
-/// Takes points of the rover frame in which the current template was taken into the current rover frame.
+/// Maps the rover frame of the current template's stop to the current rover frame.
 fn now_from_template(input: &LocateInput<'_>, memory: &TemplateMemory) -> Pose {
     input.site_from_rover.inverse() * memory.appearance.site_from_rover
 }
 
-/// Takes points of the rover frame of an older appearance into the current one.
+/// Maps the rover frame of an older appearance to the current one.
 pub(super) fn now_from_kept(input: &LocateInput<'_>, memory: &TemplateMemory, kept: &Kept) -> Pose {
     let template_from_kept = memory.appearance.site_from_rover.inverse() * kept.appearance.site_from_rover;
     now_from_template(input, memory) * template_from_kept
 }
 
-/// Matches every template that the settings ask for.
+/// Matches every template that the settings require, and selects the best.
 pub(super) fn choose<'a>(
     input: &LocateInput<'a>,
     memory: &'a TemplateMemory,
@@ -88,7 +88,7 @@ pub(super) fn choose<'a>(
                 return Err(Unmatched::without_template());
             }
             if preparation == Preparation::ScaleRoll && !is_warped {
-                // It is the window that was matched last.
+                // The same window was just matched.
                 continue;
             }
             let (prepared, first) =
@@ -127,7 +127,7 @@ pub(super) fn choose<'a>(
     }
 }
 
-/// The first stage's match of one template.
+/// Returns the first stage's match of one template.
 fn attempt<'a>(
     appearance: &'a Appearance,
     now_from_template: &Pose,
@@ -158,7 +158,7 @@ fn describe(prepared: &Prepared<'_>, first: &FirstMatch, focused_score: Option<f
     }
 }
 
-/// How each appearance is prepared, in the order in which the windows are matched.
+/// How each appearance is prepared, in the order of matching.
 fn preparations(settings: &TemplateSettings) -> Vec<Preparation> {
     if settings.transform == Transform::Geometry {
         return vec![Preparation::Surface, Preparation::ScaleRoll];

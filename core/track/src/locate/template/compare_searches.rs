@@ -1,4 +1,4 @@
-//! Both searches of one step of a run side by side: where coarse to fine differs from exhaustive (R65).
+//! Compares both searches at one step of a run: where coarse to fine differs from exhaustive (R65).
 
 use super::scale_roll::scale_roll;
 use super::settings::TemplateSettings;
@@ -7,9 +7,9 @@ use crate::trace::StepTrace;
 use sightline_geometry::frames::Pose;
 use sightline_vision::correlate::coarse_to_fine::{Comparison, compare};
 
-/// Repeats the search of `step`, whose estimated pose is `site_from_rover`, both ways with the template that `before` had.
+/// Repeats the search of `step`, whose estimated pose is `site_from_rover`, both ways with the template of `before`.
 ///
-/// `None` where that step searched nothing.
+/// `None` if that step did not search.
 pub fn compare_searches(
     before: &Target,
     step: &StepTrace,

@@ -1,11 +1,11 @@
 //! A match corrected against the designated window (R71, `template_update = drift_corrected`).
 //!
-//! Renewing the template at every update keeps it like what is seen, and chains the errors of all matches. Here the
-//! designated window, prepared by the geometry from its own stop, is looked for within `drift_reach_px` of the match (Matthews,
-//! Ishikawa & Baker 2004). Where it scores `drift_ncc_min`, stays that near and need not be magnified by more than
-//! `drift_scale_max`, its place is taken instead, and its error starts from the designation's. Else the match stands with
-//! the error it had. The last condition is there because a window magnified fivefold shows four of its pixels: what is left
-//! is a ramp that scores well anywhere.
+//! Renewing the template at every update keeps it similar to the current view, but accumulates the errors of all
+//! matches. Here the designated window, prepared by the geometry from its own stop, is searched for within
+//! `drift_reach_px` of the match (Matthews, Ishikawa & Baker 2004). Its position replaces the match, and its error
+//! starts from the designation's, if it scores `drift_ncc_min`, is that near and is scaled by at most
+//! `drift_scale_max`. Otherwise the match and its error are kept. The scale is limited because a window magnified
+//! fivefold shows four of its pixels: a ramp that scores well anywhere.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -23,26 +23,26 @@ use sightline_record::{Declaration, Record, Unit};
 use sightline_vision::correlate::{Focus, find_peak, zncc_surface};
 use sightline_vision::image::{PixelRect, patch};
 
-/// The designated window's own match.
+/// The match of the designated window.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct DriftCorrection {
-    /// The stop of the designated window.
+    /// The step of the designated window.
     pub template_step: usize,
-    /// By how much it was magnified.
+    /// Scale applied to the window.
     pub scale: f64,
-    /// Where it matched, px.
+    /// Position of its match, px.
     pub pixel: Pixel,
-    /// Its score.
+    /// Score of its match.
     pub score: f64,
-    /// How far that lies from the match of the renewed template, px.
+    /// Distance of that position from the match of the renewed template, px.
     pub shift_px: f64,
-    /// Whether that place is taken.
+    /// Whether that position is used.
     pub accepted: bool,
 }
 
-/// Looks for the designated window about `matched`; with the record the error of its place.
+/// Matches the designated window around `matched`; returns the record and the error of its position.
 ///
-/// `None` before the first renewal, and where nothing can be compared.
+/// `None` before the first renewal, or if nothing can be compared.
 pub(super) fn correct(
     input: &LocateInput<'_>,
     memory: &TemplateMemory,

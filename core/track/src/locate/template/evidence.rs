@@ -15,22 +15,22 @@ use super::triangulate::Triangulation;
 use super::warnings::Warning;
 use sightline_record::Stage;
 
-/// What the template locator saw; a step that was not reached is null.
+/// The evidence of the template locator; a step that was not reached is null.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct TemplateEvidence {
-    /// Why the target may be badly picked; at the designation only.
+    /// Why the designated target may be unsuitable; at the designation only.
     pub warnings: Vec<Warning>,
     /// The template, scaled and rolled.
     pub scale_roll: Option<ScaleRoll>,
     /// Its match in the left image.
     pub match_template: Option<TemplateMatch>,
-    /// The match of the designated window, where matches are corrected by it.
+    /// The match of the designated window; null unless matches are corrected by it.
     pub drift_correction: Option<DriftCorrection>,
-    /// The heights around the target, where they are weighed.
+    /// The heights around the target; null without the height term.
     pub relief: Option<Relief>,
     /// The corresponding point in the right image.
     pub point_stereo: Option<PointStereo>,
-    /// The position from both.
+    /// The position triangulated from both pixels.
     pub triangulate: Option<Triangulation>,
 }
 

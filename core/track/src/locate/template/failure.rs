@@ -16,7 +16,7 @@ pub enum TemplateFailure {
         /// Side of the window, px.
         size_px: u32,
     },
-    /// The helper points of scale and roll are not seen.
+    /// The helper points of scale and roll are not visible.
     #[error("the predicted target lies behind the left camera or outside its model")]
     PredictionUnseen,
     /// The pose estimates make the template too small or too large to be compared.

@@ -11,32 +11,32 @@ use sightline_vision::correlate::lucas_kanade::Placed;
 use sightline_vision::correlate::peak::Peak;
 use sightline_vision::image::PixelRect;
 
-/// How a descent ended.
+/// The result of a descent.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Descent {
-    /// Steps taken, over all levels.
+    /// Number of steps, over all levels.
     pub iterations: u32,
-    /// Root mean square of what the last step left unexplained, fractions of full scale.
+    /// RMS residual after the last step, fraction of full scale.
     pub residual: f64,
-    /// How offsets from the template's middle map into the image, px per px.
+    /// Maps offsets from the template's centre into the image, px per px.
     #[schema(value_type = Vec<f64>)]
     pub map: Matrix2<f64>,
 }
 
-/// A maximum that was weighed.
+/// A maximum that the height term compared.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct WeighedPeak {
-    /// Where it lies, px.
+    /// Its position, px.
     pub pixel: Pixel,
     /// Its score.
     pub score: f64,
-    /// How well its relief agrees with the template's, 0 to 1.
+    /// Agreement of its relief with the template's, 0 to 1.
     pub agreement: f64,
-    /// Both together.
+    /// Weighted mean of score and agreement.
     pub total: f64,
 }
 
-/// What the first stage found.
+/// The result of the first stage.
 #[derive(Clone, Debug)]
 pub struct FirstMatch {
     pub(super) search_window: PixelRect,

@@ -5,15 +5,16 @@
 //! | 1 `ncc` | score of the match | ≥ `ncc_min` |
 //! | 2 `stereo_ncc` | score of point stereo | ≥ `stereo_ncc_min` |
 //! | 3, 4 | corrections of distance and position, see `judge` | ≤ their tolerances |
-//! | 5 `left_right_px` | way from the left pixel to the right one and back | ≤ `left_right_max_px` |
+//! | 5 `left_right_px` | distance between the left pixel and the match of its right pixel in the left image | ≤ `left_right_max_px` |
 //! | 6 `second_peak_ratio` | second peak over the best; 0 without one (R68) | ≤ `second_peak_ratio_max` |
 //! | 7 `match_sigma_px` | largest 1σ axis of the match's own covariance | ≤ `match_sigma_max_px` |
-//! | 8 `edge_distance_px` | from the best whole pixel to the rim of the positions compared | ≥ `edge_distance_min_px` |
+//! | 8 `edge_distance_px` | distance of the best whole pixel from the border of the compared positions | ≥ `edge_distance_min_px` |
 //! | 9 `far_ncc` | score of a match far from the prediction | ≥ `far_ncc_min` |
 //!
-//! Gates 5 to 8 exist only where their limit switches them on.
+//! Gates 5 to 8 exist only if their limit enables them.
 //!
-//! A match far from the prediction (`near`) was found in a larger area, in which a wrong one is likelier: it must score more.
+//! A match far from the prediction (`near`) comes from a larger area, where a wrong one is more likely: it needs a
+//! higher score.
 
 use super::evidence::TemplateEvidence;
 use super::match_template::TemplateMatch;
@@ -114,7 +115,7 @@ pub(super) fn gates(evidence: &TemplateEvidence, input: &GateInput<'_>) -> Vec<G
     gates
 }
 
-/// The gates of the peak that are switched on.
+/// The enabled gates of the peak.
 fn peak_gates(matched: Option<&TemplateMatch>, limits: &Limits) -> Vec<Gate> {
     let mut gates = Vec::new();
     let ratio = matched.map(|m| m.second_peak.as_ref().map_or(0.0, |second| second.ratio));
@@ -125,7 +126,7 @@ fn peak_gates(matched: Option<&TemplateMatch>, limits: &Limits) -> Vec<Gate> {
     if limits.match_sigma_max_px > 0.0 {
         gates.push(MATCH_SIGMA.judge(sigma_px, limits.match_sigma_max_px));
     }
-    // A descent by gradient compares no window of positions, and has no rim.
+    // A gradient descent compares no window of positions, and so has no border.
     let is_searched = matched.is_none_or(|m| m.descent.is_none());
     if limits.edge_distance_min_px > 0.0 && is_searched {
         let edge_px = matched.and_then(|m| m.edge_distance_px);

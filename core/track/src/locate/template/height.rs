@@ -1,15 +1,15 @@
 //! The height term of Rocky 7's tracker: relief beside intensity (R220); off by default.
 //!
-//! Where the target's look repeats itself, its shape may not. The relief of the template was measured when it was taken: the
-//! points of eight neighbours around the target (`relief`). Carried into the present rover frame, they say at which pixels
-//! and how much farther than the target they should be seen. At each of the highest maxima of the surface the same is
-//! measured by stereo, and
+//! If the appearance of the target is repetitive, its shape may not be. The relief of the template is measured when
+//! it is taken: the points of eight neighbours around the target (`relief`). Carried into the current rover frame,
+//! they predict the pixels of the neighbours and their ranges relative to the target. At each of the highest maxima
+//! of the score map the same is measured by stereo, and
 //! ```text
 //! agreement = 1 − min(1, rms(h_expected − h_measured) / height_scale_m)          h = R − R_target
 //! total     = (1 − w) · score + w · agreement
 //! ```
-//! decides between them; the place below the pixel remains that of the scores. Where fewer than three neighbours have both
-//! heights, the agreement is 0. Stereo's own error, R²σ_d/(f B), belongs to the scale: a few centimetres at 5 m.
+//! decides between them; the sub-pixel position remains that of the scores. With fewer than three neighbours that
+//! have both heights, the agreement is 0. The scale must include stereo's own error, R²σ_d/(f B): a few centimetres at 5 m.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -26,13 +26,13 @@ use sightline_geometry::frames::{Pixel, Point3, Pose};
 use sightline_record::{Declaration, Record, Unit};
 use sightline_vision::correlate::peak;
 
-/// How many maxima are weighed.
+/// Number of maxima compared.
 const CANDIDATES: usize = 5;
 
-/// Neighbours with both heights below which there is no agreement.
+/// Smallest number of neighbours with both heights; with fewer, the agreement is 0.
 const POINTS_MIN: usize = 3;
 
-/// The relief about the left pixel of `input`, whose point lies at `range_m`; `None` where stereo is not sure of it.
+/// Measures the relief about the left pixel of `input`, whose point is at `range_m`; `None` if stereo rejects it.
 pub(super) fn relief(input: &StereoInput<'_>, range_m: f64, settings: &TemplateSettings) -> Option<Relief> {
     let point = |pixel: Pixel, near_m: f64| -> Option<Point3> {
         Some(input.left.ray(pixel)?.at(range_at(input, pixel, near_m, settings)?))
@@ -44,13 +44,13 @@ pub(super) fn relief(input: &StereoInput<'_>, range_m: f64, settings: &TemplateS
     Some(Relief { middle: point(input.left_pixel, range_m)?, neighbours })
 }
 
-/// Where a neighbour should be seen from the target, px, and how much farther it should be, m.
+/// A predicted neighbour: offset from the target, px, and range relative to the target's, m.
 struct Expected {
     offset_px: [f64; 2],
     height_m: f64,
 }
 
-/// What the present left camera should see of a relief.
+/// Predicts a relief in the current left camera: the range of the target, m, and its neighbours.
 fn expected(then: &Relief, now_from_then: &Pose, input: &StereoInput<'_>) -> Option<(f64, Vec<Expected>)> {
     let range_m = |point: &Point3| (point - input.left.model.centre()).norm();
     let middle = now_from_then * then.middle;
@@ -64,7 +64,7 @@ fn expected(then: &Relief, now_from_then: &Pose, input: &StereoInput<'_>) -> Opt
     Some((range_m(&middle), then.neighbours.iter().filter_map(expect).collect()))
 }
 
-/// Moves the match to the maximum whose score and relief together are best; gives those that were weighed.
+/// Moves the match to the maximum with the best total of score and relief; returns all maxima compared.
 pub(super) fn weigh(
     first: &mut FirstMatch,
     then: &Relief,
@@ -83,7 +83,7 @@ pub(super) fn weigh(
         let total = (1.0 - weight) * score + weight * agreement;
         weighed.push((WeighedPeak { pixel, score, agreement, total }, place));
     }
-    // The first, which scores best, stands among equals.
+    // The first maximum, which has the highest score, wins among equals.
     let best = weighed.iter().fold(None::<&(WeighedPeak, [i32; 2])>, |best, candidate| match best {
         Some(best) if best.0.total >= candidate.0.total => Some(best),
         _ => Some(candidate),
@@ -96,7 +96,7 @@ pub(super) fn weigh(
     weighed.into_iter().map(|(weighed, _)| weighed).collect()
 }
 
-/// Measured less expected heights about a pixel, as far as stereo is sure, m.
+/// Measured minus predicted heights about a pixel, m, for the neighbours that stereo accepts.
 fn differences(
     input: &StereoInput<'_>,
     pixel: Pixel,
@@ -113,7 +113,7 @@ fn differences(
     neighbours.iter().filter_map(difference).collect()
 }
 
-/// How alike two reliefs are that differ by this, 0 to 1.
+/// Agreement of two reliefs with these differences, 0 to 1.
 fn agreement(differences_m: &[f64], scale_m: f64) -> f64 {
     if differences_m.len() < POINTS_MIN {
         return 0.0;

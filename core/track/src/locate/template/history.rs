@@ -1,7 +1,7 @@
-//! The current view against every earlier template of a run (R72).
+//! Compares the current view with every earlier template of a run (R72).
 //!
-//! Each earlier template, prepared by the geometry from its own stop, gives the position that *it* would
-//! have given the target: the differences are the drift that the renewals have chained.
+//! Each earlier template, prepared by the geometry from its own stop, gives its own position of the target. The
+//! differences are the drift accumulated by the renewals.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -14,21 +14,21 @@ use sightline_geometry::frames::Pose;
 use sightline_vision::correlate::{find_peak, zncc_surface};
 use sightline_vision::image::{GrayImage, PixelRect};
 
-/// How far around the present position an earlier template is looked for, px.
+/// Radius around the current position in which an earlier template is searched for, px.
 const REACH_PX: u32 = 10;
 
-/// The present view against one earlier template.
+/// The comparison of the current view with one earlier template.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct AgainstEarlier {
-    /// The stop of that template.
+    /// The step of that template.
     pub template_step: usize,
-    /// By how much it was magnified.
+    /// Scale applied to it.
     pub scale: f64,
-    /// By how much it was rolled, rad.
+    /// Roll applied to it, rad.
     pub roll_rad: f64,
-    /// Its best score near the present position.
+    /// Its best score near the current position.
     pub score: f64,
-    /// From the present position to its own, px.
+    /// Its position relative to the current one (x, y), px.
     pub offset_px: [f64; 2],
 }
 
@@ -39,10 +39,10 @@ impl AgainstEarlier {
     }
 }
 
-/// The current view against earlier appearances of the target, in their order.
+/// Compares the current view with earlier appearances of the target, in their order.
 ///
-/// `image` is the left image of the stop of `recorded`, whose estimated pose is `site_from_rover`. Empty where that stop found
-/// no position; templates that cannot be compared are left out.
+/// `image` is the left image of the stop of `recorded`, whose estimated pose is `site_from_rover`. Empty if that stop
+/// has no position; templates that cannot be compared are omitted.
 pub fn against_earlier<'a>(
     recorded: &StepTrace,
     image: &GrayImage,

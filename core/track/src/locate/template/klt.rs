@@ -1,8 +1,8 @@
 //! First stages for comparison: pyramidal Lucas–Kanade from the prediction (R217, R218).
 //!
-//! The window has the template's side at every level, so that coarse levels see more of the surroundings, and starts at
-//! the predicted pixel. Gain and level are not solved for, as in the trackers of the sources. A descent that leaves
-//! the search window is no match. What `judge` sees is the normalised correlation at the place found.
+//! The window has the template's side at every pyramid level, so that coarse levels cover more of the surroundings,
+//! and starts at the predicted pixel. Gain and offset are not estimated, as in the trackers of the sources. A descent
+//! that leaves the search window is no match. `judge` uses the normalised correlation at the resulting position.
 
 use nalgebra::Matrix2;
 
@@ -20,7 +20,7 @@ use sightline_vision::image::{GrayImage, PixelRect, patch};
 /// Descends from the prediction.
 ///
 /// # Errors
-/// A sentence saying why there is no match.
+/// Why there is no match.
 pub(super) fn first_match(
     prepared: &Prepared<'_>,
     image: &GrayImage,
@@ -70,7 +70,7 @@ pub(super) fn first_match(
     })
 }
 
-/// The part of an image about a pixel, and its first pixel.
+/// Crops the part of an image about a pixel; also returns the first pixel of that part.
 pub(super) fn around(image: &GrayImage, centre: Pixel, side: u32) -> Option<(GrayImage, [i32; 2])> {
     let part =
         PixelRect::centred(centre, side).intersect(&PixelRect::whole(image.width(), image.height()))?;

@@ -1,25 +1,25 @@
-//! How well one match fixes its position, measured from the match itself (ours).
+//! The position error of one match, measured from the match itself (ours).
 //!
-//! Least squares of the normalised patches: with the residual r = Ĵ − ncc·Î and the gradients g of the matched
-//! patch (per px), a displacement error is `δ = A⁻¹ Σ w g r`, `A = Σ w g gᵀ`, with the weights w through which the
-//! match was refined (`correlate::focus`). Residuals of neighbouring pixels are
-//! alike (both patches were resampled, and what perspective changes is smooth), so their covariance is taken
-//! with its spatial correlation (White 1980; Newey & West 1987, with Bartlett weights in two dimensions):
+//! Least squares of the normalised patches: with the residual r = Ĵ − ncc·Î and the gradients g of the matched patch
+//! (per px), a displacement error is `δ = A⁻¹ Σ w g r`, `A = Σ w g gᵀ`, with the weights w of the refinement of the
+//! match (`correlate::focus`). Residuals of neighbouring pixels are correlated (both patches are resampled, and the
+//! effect of perspective is smooth), so their covariance is estimated with its spatial correlation (White 1980; Newey
+//! & West 1987, with Bartlett weights in two dimensions):
 //! ```text
 //! Σ_δ = n/(n − 4) A⁻¹ B A⁻¹,   B = Σ_ij c(i − j) w_i w_j r_i r_j g_i g_jᵀ,   c = (1 − |Δx|/(L+1)) (1 − |Δy|/(L+1))
 //! ```
-//! so no noise level has to be assumed. The fit has taken four numbers (two shifts, gain, level) out of the residual,
-//! which holds only `n = (Σw)² / Σw² / Σc` independent ones, so that it is smaller than what disturbed the match:
-//! hence the factor (as HC1 of MacKinnon & White 1985); an affine map takes eight. To this comes a floor for the sub-pixel fit itself, whose error does
-//! not show in the residual.
+//! so no noise level is assumed. The fit removes four parameters (two shifts, gain, offset; with an affine map eight)
+//! from a residual with only `n = (Σw)² / Σw² / Σc` independent samples, which makes it smaller than the actual
+//! disturbance: hence the factor (as HC1 of MacKinnon & White 1985). A floor is added for the sub-pixel fit itself,
+//! whose error does not appear in the residual.
 //!
-//! Where the template was prepared by scale and roll alone, the surface's slope stretches the image by another
-//! map, F = I + E. The best shift of a patch that is stretched by E and yet compared unstretched is not zero:
+//! If the template was prepared by scale and roll alone, the surface's slope stretches the image by another map, F =
+//! I + E. The best shift of a patch that is stretched by E but compared unstretched is not zero:
 //! ```text
 //! b = A⁻¹ Σ w g gᵀ E o      o: offset of a pixel from the patch's middle
 //! ```
-//! This bias depends on where the patch has its texture, points the same way step after step, and is therefore
-//! returned apart from the covariance.
+//! This bias depends on where the patch has texture, has the same direction step after step, and is therefore
+//! returned separately from the covariance.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -35,13 +35,13 @@ use sightline_vision::correlate::Focus;
 use sightline_vision::image::gradient;
 use sightline_vision::image::patch::Patch;
 
-/// Over how many pixels residuals are taken as correlated.
+/// Distance over which residuals are taken as correlated, px.
 const CORRELATION_REACH_PX: i64 = 4;
 
-/// Numbers that a match fits: two shifts, gain and level.
+/// Number of parameters of a match: two shifts, gain and offset.
 const FITTED: f64 = 4.0;
 
-/// Numbers that an affine map fits beside them.
+/// Number of further parameters of an affine map.
 const FITTED_BY_MAP: f64 = 4.0;
 
 /// 1σ error of the quadratic fit of a peak and of resampling, px.
@@ -55,17 +55,17 @@ const UNDETERMINED_PX: f64 = 10.0;
 pub struct MatchNoise {
     /// Covariance of the position, px².
     pub covariance_px2: Matrix2<f64>,
-    /// What the misfit of the prepared template adds to the position, px.
+    /// Shift of the position by the misfit of the prepared template, px.
     pub bias_px: Vector2<f64>,
 }
 
-/// The error of the position of `matched` against `template`, patches of the size of `focus`, where the true map
-/// between them is `I + misfit`.
+/// The error of the position of `matched` against `template`, patches of the size of `focus`, if the true map between
+/// them is `I + misfit`.
 pub fn match_noise(template: &Patch, matched: &Patch, misfit: &Matrix2<f64>, focus: &Focus) -> MatchNoise {
     noise(template, matched, misfit, focus, FITTED)
 }
 
-/// The error of the position of `matched`, read through an affine map that was fitted to `template`, all pixels alike.
+/// The error of the position of `matched`, sampled through an affine map fitted to `template`, with equal weights.
 pub fn affine_noise(template: &Patch, matched: &Patch) -> MatchNoise {
     let focus = Focus::new(template.width(), 0.0);
     noise(template, matched, &Matrix2::zeros(), &focus, FITTED + FITTED_BY_MAP)
@@ -116,8 +116,8 @@ fn freedom(focus: &Focus, fitted: f64) -> f64 {
     independent / (independent - fitted)
 }
 
-/// `Σ_ij c(i − j) v_i v_jᵀ` over a grid of vectors: c is a product of one factor a direction, so that the sum over
-/// the neighbours is taken along rows first, then along columns.
+/// `Σ_ij c(i − j) v_i v_jᵀ` over a grid of vectors: c is a product of one factor per direction, so the sum over the
+/// neighbours is taken along rows first, then along columns.
 fn correlated_sum(vectors: &[Vector2<f64>], width: i64, height: i64) -> Matrix2<f64> {
     let reach = CORRELATION_REACH_PX;
     let around = |from: &[Vector2<f64>], [x, y]: [i64; 2], [dx, dy]: [i64; 2]| {

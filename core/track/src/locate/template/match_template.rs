@@ -1,17 +1,17 @@
-//! Step `match_template`: the prepared template in the left image (K§4.3.2, R62–R68, R216–R222).
+//! Step `match_template`: matches the prepared template in the left image (K§4.3.2, R62–R68, R216–R222).
 //!
-//! **First stage.** By default normalised correlation at every position of the search window: the square image region in
-//! which the whole template must lie, centred on the prediction. `measure` takes another likeness, `search` visits fewer
-//! positions, `first_stage` descends along the gradient instead (`klt`). The match is the peak of the measure's own
-//! surface, refined below the pixel by a quadratic fit (R67); with `ncc` it is then followed to the next maximum of
-//! scores that count the window's centre most (`correlate::focus`); where there is none, the peak stands. The second
-//! peak at least half a template away is reported (R68).
+//! **First stage.** By default normalised correlation at every position of the search window: the square image region
+//! that contains the whole template, centred on the prediction. `measure` selects another similarity measure,
+//! `search` visits fewer positions, `first_stage` descends along the gradient instead (`klt`). The match is the peak
+//! of the measure's own score map, refined to sub-pixel accuracy by a quadratic fit (R67). With `ncc` it is then
+//! moved to the next maximum of scores that weight the window's centre most (`correlate::focus`); if there is none,
+//! the peak is kept. The second peak at least half a template away is reported (R68).
 //!
-//! **Second stage.** With `refine = affine` an affine descent starts there (`affine`).
+//! **Second stage.** With `refine = affine` an affine descent starts at that match (`affine`).
 //!
-//! **Score.** Whatever found the place, `judge` is given the normalised correlation there, of the window as the last stage
-//! saw it: sums of differences grow with the contrast of the scene and the change of its light, so that no limit
-//! fits all, and the papers' 0.7 is one of correlation. The measure's own value stands beside it, in `peak`.
+//! **Score.** With any measure, `judge` uses the normalised correlation at the match, of the window of the last
+//! stage: sums of differences grow with the contrast of the scene and the change of its light, so that no limit fits
+//! all, and the papers' 0.7 is a correlation. The measure's own value is in `peak`.
 
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
@@ -40,7 +40,7 @@ use sightline_vision::image::{GrayImage, PixelRect};
 /// A template that was tried: one of several appearances, warped or not, or one pair of a brute-force search.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct TriedTemplate {
-    /// The stop at which it was taken.
+    /// The step at which it was taken.
     pub template_step: usize,
     /// Whether it was warped by the slope of the surface instead of scaled and rolled.
     #[serde(default)]
@@ -49,9 +49,9 @@ pub struct TriedTemplate {
     pub scale: f64,
     /// Roll that was applied, rad.
     pub roll_rad: f64,
-    /// Its best score, of the measure.
+    /// Its best score by the measure.
     pub score: f64,
-    /// The score in focus there; null where there is no focus.
+    /// The focused score at that match; null without a focus.
     #[serde(default)]
     pub focused_score: Option<f64>,
 }
@@ -59,43 +59,44 @@ pub struct TriedTemplate {
 /// The match of the template in the left image.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct TemplateMatch {
-    /// The region searched, cut to the image: the whole template lies in it.
+    /// The searched region, clipped to the image; it contains the whole template.
     pub search_window: PixelRect,
-    /// How many positions were compared with this template.
+    /// Number of positions compared with this template.
     pub positions: u32,
-    /// How many with all templates that were tried.
+    /// Number of positions compared with all templates tried.
     pub comparisons: u64,
-    /// How many of the positions had no contrast.
+    /// Number of positions without contrast.
     pub flat_positions: u32,
     /// The measure by which `surface`, `peak` and `second_peak` score.
     pub measure: Measure,
     /// The best match of the whole window by the measure, or the best near the prediction (`near`).
     pub peak: Peak,
-    /// Where the target is: the best match in focus or of the second stage, or `peak` where there is neither, px.
+    /// Position of the target, px: the best match in focus or of the second stage, or `peak` without either.
     pub pixel: Pixel,
-    /// Normalised correlation there: what is judged.
+    /// Normalised correlation at `pixel`; the judged score.
     pub score: f64,
-    /// The score in focus at `pixel`; null where the peak of the whole window stands.
+    /// The focused score at `pixel`; null if the peak of the whole window is used.
     pub focused_score: Option<f64>,
-    /// The next best, at least half a template away; its ratio is above 1 where a better match far from the prediction was given up.
+    /// The next best peak, at least half a template away; its ratio is above 1 if a better match far from the
+    /// prediction was rejected.
     pub second_peak: Option<SecondPeak>,
-    /// What the coarse-to-fine search saw; null for an exhaustive one.
+    /// The coarse levels of the search; null for an exhaustive one.
     pub coarse: Option<CoarseSearch>,
-    /// The descent of a klt first stage.
+    /// The descent of a KLT first stage; null for a correlation.
     pub descent: Option<Descent>,
-    /// The second stage.
+    /// The second stage; null if it is off.
     pub affine: Option<AffineRefinement>,
-    /// Every template that was tried, where there was more than one.
+    /// All templates that were tried; empty if there was only one.
     pub tried: Vec<TriedTemplate>,
-    /// The maxima between which the height term decided, where it is on.
+    /// The maxima compared by the height term; empty if it is off.
     pub weighed: Vec<WeighedPeak>,
     /// Covariance of this match alone, px².
     #[schema(value_type = Vec<f64>)]
     pub covariance_px2: Matrix2<f64>,
-    /// What the surface's slope, which scale and roll leave out, adds to this match, px.
+    /// Bias of this match by the surface's slope, which scale and roll ignore, px.
     #[schema(value_type = [f64; 2])]
     pub bias_px: Vector2<f64>,
-    /// Distance from the best whole pixel to the rim of the positions compared, px; `None` after a descent.
+    /// Distance from the best whole pixel to the border of the compared positions, px; `None` after a descent.
     #[serde(default)]
     pub edge_distance_px: Option<f64>,
     /// Scores of the positions; NaN where none was compared, empty after a descent.
@@ -112,17 +113,17 @@ pub struct TemplateMatch {
     pub difference: Unsent<Patch>,
 }
 
-/// Distance from a whole pixel to the rim of the positions compared, px; `None` outside them.
+/// Distance from a whole pixel to the border of the compared positions, px; `None` outside them.
 fn edge_distance_px(surface: &Surface, [x, y]: [i32; 2]) -> Option<f64> {
     let (ix, iy) = surface.index_of(x, y)?;
     let distance = ix.min(surface.width - 1 - ix).min(iy).min(surface.height - 1 - iy);
     Some(f64::from(distance))
 }
 
-/// Finds the prepared template around the prediction by the first stage.
+/// Matches the prepared template around the prediction by the first stage.
 ///
 /// # Errors
-/// A sentence saying why no position could be compared.
+/// Why no position could be compared.
 pub fn first_match(
     prepared: &Prepared<'_>,
     input: &LocateInput<'_>,
@@ -172,7 +173,7 @@ fn correlate(
     }
 }
 
-/// The score in focus at the first stage's match; `None` where there is no focus.
+/// The focused score at the first stage's match; `None` without a focus.
 pub(super) fn focused_score(
     prepared: &Prepared<'_>,
     first: &FirstMatch,
@@ -188,12 +189,12 @@ fn is_correlated(first: &FirstMatch, settings: &TemplateSettings) -> bool {
     first.descent.is_none() && settings.measure == Measure::Ncc
 }
 
-/// The weights in focus; even ones where the match is not one of correlation.
+/// The weights of the focus; uniform if the match is not a correlation.
 fn focus_of(is_correlated: bool, settings: &TemplateSettings) -> Focus {
     Focus::new(settings.template_size_px, if is_correlated { settings.focus_px } else { 0.0 })
 }
 
-/// The match that the first stage's begins: refined, scored, and with its error.
+/// Completes the first stage's match: refines and scores it, and estimates its error.
 pub fn finish(
     prepared: &Prepared<'_>,
     first: FirstMatch,
@@ -220,7 +221,7 @@ pub fn finish(
         true => peak.score,
         false => zncc(template, &matched).map_or(0.0, f64::from),
     };
-    // A map that was measured leaves no stretch to be corrected for.
+    // A fitted map leaves no stretch to correct for.
     let noise = match is_straight {
         true => match_noise(template, &matched, &prepared.record.misfit(), &focus),
         false => affine_noise(template, &matched),
@@ -255,7 +256,7 @@ pub fn finish(
     }
 }
 
-/// The window of the image at a match; where it is only shifted, its pixels are those of the image's grid.
+/// The window of the image at a match; for a pure shift, its pixels are on the image's grid.
 fn window_at(placed: &Placed, image: &GrayImage, settings: &TemplateSettings) -> Patch {
     let size = settings.template_size_px;
     match placed.map == Matrix2::identity() {
@@ -264,7 +265,7 @@ fn window_at(placed: &Placed, image: &GrayImage, settings: &TemplateSettings) ->
     }
 }
 
-/// The maximum in focus beside the peak of the whole window, with its score.
+/// The maximum of the focused scores next to the peak of the whole window, with its score.
 pub(super) fn refine(
     focus: &Focus,
     template: &Patch,
@@ -279,7 +280,7 @@ pub(super) fn refine(
     let whole = Pixel::new(x, y);
     let half = settings.template_size_px / 2;
     let window_at = |dx: i32, dy: i32| {
-        // At whole pixels every kernel gives the pixels themselves.
+        // At whole pixels every kernel returns the pixels themselves.
         let centre = whole.offset(f64::from(dx), f64::from(dy));
         Some(patch::extract(image, centre, half, Kernel::Bilinear))
     };
@@ -347,7 +348,7 @@ impl Record for TemplateMatch {
     }
 }
 
-/// The arrays of this stage that panels draw by themselves.
+/// Names of the arrays of this stage that a panel draws individually.
 impl ArrayName {
     /// The image at the match.
     pub const MATCHED: Self = Self::new("matched");

@@ -1,7 +1,7 @@
 //! The memory of the template tracker: the template in use and the appearances that renewals replaced (R23, R59, R70).
 //!
-//! Serialised, an image is left out: it is the left image of the stop that the appearance names, and whoever resumes a
-//! drive reads it again from the recording (`TrackerMemory::lacks_image_of`).
+//! Images are not serialised: each is the left image of the stop of its appearance, and resuming a drive reads it
+//! again from the recording (`TrackerMemory::lacks_image_of`).
 
 use std::sync::Arc;
 
@@ -19,17 +19,17 @@ use sightline_vision::image::GrayImage;
 /// The memory of the template tracker.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TemplateMemory {
-    /// How the target looked when the template was taken.
+    /// The appearance of the target when the template was taken.
     pub appearance: Appearance,
-    /// The error of the template's centre against the designated point, in the image of `appearance`: the sum of what
-    /// the renewals of the template have added so far.
+    /// The error of the template's centre relative to the designated point, in the image of `appearance`, accumulated
+    /// over the renewals of the template.
     pub drift: Drift,
     /// The appearances that renewals replaced, oldest first.
     pub replaced: Replaced,
 }
 
 impl TemplateMemory {
-    /// The memory after the template was renewed; of the replaced appearances the first and the newest `count` stay.
+    /// Returns the memory after a renewal of the template; keeps the first replaced appearance and the newest `count`.
     #[must_use]
     pub fn renewed(self, appearance: Appearance, drift: Drift, count: usize) -> Self {
         let old = Kept { appearance: self.appearance, drift: self.drift };
@@ -38,7 +38,7 @@ impl TemplateMemory {
 }
 
 impl TemplateMemory {
-    /// Declares the memory for the stage that leaves it to the next stop.
+    /// Declares the memory for the stage that passes it to the next stop.
     pub(crate) fn declare(r: &mut Declaration<Self>) {
         declare_camera(r, "target.memory.appearance.camera");
         r.field("target.memory.appearance.pixel", Unit::Pixel);
@@ -62,18 +62,18 @@ impl TemplateMemory {
     }
 }
 
-/// How the target looked when its template was taken (R23, R59).
+/// The appearance of the target when its template was taken (R23, R59).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Appearance {
-    /// The stop at which the template was taken.
+    /// The step at which the template was taken.
     pub step: usize,
-    /// Where the target was in that left image, px.
+    /// Position of the target in that left image, px.
     pub pixel: Pixel,
-    /// Where the target was in the rover frame *of that stop*, m: `p_old` of K-Eq 6.
+    /// Position of the target in the rover frame *of that stop*, m: `p_old` of K-Eq 6.
     pub position_in_rover: Point3,
-    /// How the surface point moves with that pixel, m per px, where stereo told.
+    /// Derivative of the surface point with respect to that pixel, m per px; `None` if stereo gave none.
     pub surface_by_pixel: Option<Matrix3x2<f64>>,
-    /// The heights around it, where they are weighed.
+    /// The heights around the target; `None` without the height term.
     pub relief: Option<Relief>,
     /// The left camera in the rover frame of that stop.
     pub camera: Camera,
@@ -87,9 +87,9 @@ pub struct Appearance {
 /// An appearance that was replaced, with the error of its centre.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Kept {
-    /// How the target looked.
+    /// The appearance.
     pub appearance: Appearance,
-    /// The error of its centre against the designated point, in its own image.
+    /// The error of its centre relative to the designated point, in its own image.
     pub drift: Drift,
 }
 
@@ -98,7 +98,7 @@ pub struct Kept {
 pub struct Replaced(Vec<Kept>);
 
 impl Replaced {
-    /// Adds an appearance, and forgets all but the first and the newest `count`.
+    /// Adds an appearance, and drops all but the first and the newest `count`.
     #[must_use]
     pub fn with(mut self, kept: Kept, count: usize) -> Self {
         self.0.push(kept);
@@ -108,7 +108,7 @@ impl Replaced {
         self
     }
 
-    /// The designated appearance, once it was replaced.
+    /// The designated appearance; `None` before the first renewal.
     pub fn first(&self) -> Option<&Kept> {
         self.0.first()
     }

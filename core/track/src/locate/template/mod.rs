@@ -1,11 +1,11 @@
 //! The template locator: `scale_roll` → `match_template` → `point_stereo` → `triangulate` (K§4.1, R23–R29).
 //!
-//! The observations of each step are one field of [`TemplateEvidence`].
+//! The evidence of each step is one field of [`TemplateEvidence`].
 //!
-//! Noise (ours; the papers' half pixel is the preset `half_pixel`): the covariance of the target's left
-//! position against the designated point is that of the template carried along on the surface, `F D Fᵀ`, plus
-//! that of this match; what biases the matches is carried as `F B + b` and enters the position as `B Bᵀ`.
-//! `point_stereo` sees the same left position, so both eyes share its error.
+//! Noise (ours; the papers' half pixel is the preset `half_pixel`): the covariance of the target's left position
+//! relative to the designated point is that of the template, mapped along the surface, `F D Fᵀ`, plus that of this
+//! match. Biases of the matches accumulate as `F B + b` and enter the position as `B Bᵀ`. `point_stereo` uses the
+//! same left position, so both cameras share its error.
 
 mod choices;
 pub mod evidence;
@@ -55,7 +55,7 @@ use sightline_geometry::estimate::drift::Drift;
 use sightline_geometry::frames::Pixel;
 use sightline_vision::image::patch;
 
-/// Normalised correlation of a scaled and rolled template (Kim et al. 2009).
+/// Tracks a scaled and rolled template by normalised correlation (Kim et al. 2009).
 #[derive(Clone, Copy, Debug)]
 pub struct TemplateTracker;
 
@@ -180,7 +180,7 @@ fn designate(input: &DesignateInput<'_>) -> Sighting<TemplateEvidence> {
         return Sighting::nothing(missing, TemplateEvidence::default());
     }
     let covariance = match settings.noise_model {
-        // The click defines the target: it has no error of its own.
+        // The designation defines the target: it has no error of its own.
         NoiseModel::Measured => Matrix2::zeros(),
         NoiseModel::HalfPixel => Matrix2::identity() * HALF_PIXEL_VARIANCE,
     };
@@ -202,7 +202,7 @@ fn designate(input: &DesignateInput<'_>) -> Sighting<TemplateEvidence> {
     found
 }
 
-/// What point stereo is given at a later stop.
+/// The input of point stereo at a later stop.
 fn stereo_input<'a>(
     input: &LocateInput<'a>,
     left_pixel: Pixel,
@@ -225,14 +225,14 @@ fn contradiction(settings: &TemplateSettings) -> Option<TemplateFailure> {
     settings.contradiction().map(TemplateFailure::Settings)
 }
 
-/// The reason why a designated window cannot be found again where all its pixels are equal.
+/// Returns why a designated window without contrast cannot be tracked.
 fn without_contrast(input: &DesignateInput<'_>, settings: &TemplateSettings) -> Option<TemplateFailure> {
     let size = settings.template_size_px;
     let window = patch::extract(&input.capture.pair.left, input.pixel, size / 2, settings.kernel);
     (window.is_complete() && window.is_flat()).then_some(TemplateFailure::NoContrast { size_px: size })
 }
 
-/// The two steps that designation and tracking share: point stereo and triangulation.
+/// Point stereo and triangulation, which designation and tracking share.
 fn finish(
     mut evidence: TemplateEvidence,
     input: &StereoInput<'_>,
@@ -247,7 +247,7 @@ fn finish(
         Err(missing) => return Sighting { missing: Some(missing.to_string()), evidence, ..found },
     };
     found.right_pixel = Some(stereo.right_pixel);
-    // A best score at the end of the curve may belong to a point beyond it: its range is not known.
+    // A best score at the end of the curve may belong to a point beyond it: its range is unknown.
     let triangulated = if stereo.at_end {
         Err(TemplateFailure::StereoAtEnd { range_m: stereo.range_m })
     } else {

@@ -4,14 +4,14 @@
 //! far    νᵀ (Σ_pred + Σ_match)⁻¹ ν > far_sigma²                     ν = pixel − predicted
 //! near   instead of a far match if   s_near ≥ far_ncc_min   and   1 − s_near < far_miss_factor · (1 − s_far)
 //! ```
-//! Kim et al. take the highest score of the search window. If that match is far from the prediction, and the highest maximum near the
-//! prediction fulfils both conditions, the latter is taken. Example: the edge of a shadow, 38 px (40 σ) from the prediction, scored 0.948;
-//! the target scored 0.940 and was lost without a failed gate.
+//! Kim et al. take the highest score of the search window. If that match is far from the prediction, and the highest
+//! maximum near the prediction fulfils both conditions, the latter is taken. Example: the edge of a shadow, 38 px (40
+//! σ) from the prediction, scored 0.948; the target scored 0.940 and was lost without a failed gate.
 //!
-//! Why a factor of 2: for a window of N independent pixels, the likelihood ratio of the far place to the near one is
-//! `((1 − s_near²) / (1 − s_far²))^(N/2)`. With N = 40 and a factor of 2 it is 10⁶, about the prior ratio of the two places if one prediction
-//! in a thousand is wrong. Why `far_ncc_min`: where the target is outside the search window, the best match near the prediction scores less,
-//! and taking it would be false tracking.
+//! Why a factor of 2: for a window of N independent pixels, the likelihood ratio of the far position to the near one
+//! is `((1 − s_near²) / (1 − s_far²))^(N/2)`. With N = 40 and a factor of 2 it is 10⁶, about the prior ratio of the
+//! two positions if one prediction in a thousand is wrong. Why `far_ncc_min`: if the target is outside the search
+//! window, the best match near the prediction scores less, and taking it would be false tracking.
 //!
 //! It applies to normalised correlation only, not to other measures or after a descent.
 //!
@@ -31,7 +31,7 @@ use crate::stages::point_mast::Pointing;
 use sightline_geometry::frames::Pixel;
 use sightline_vision::correlate::peak::{self, Peak};
 
-/// Whether a match with this covariance is farther than `sigmas` standard deviations from the prediction; no if that is unknown.
+/// Whether a match with this covariance is more than `sigmas` standard deviations from the prediction; `false` without one.
 pub(super) fn is_far(pointing: &Pointing, pixel: Pixel, covariance_px2: &Matrix2<f64>, sigmas: f64) -> bool {
     let (Some(predicted), Some(covariance)) = (pointing.predicted_left, pointing.predicted_covariance_px2)
     else {
@@ -46,14 +46,14 @@ fn is_far_peak(peak: &Peak, input: &LocateInput<'_>) -> bool {
     is_far(input.pointing, peak.pixel, &peak.covariance_px2, input.settings.limits.far_sigma)
 }
 
-/// Whether a match near the prediction is taken instead of one far from it, by their scores.
+/// Whether a match near the prediction is preferred to one far from it, by their scores.
 fn is_taken(near: f64, far: f64, input: &LocateInput<'_>) -> bool {
     let settings = input.settings;
     let is_nearly_alike = 1.0 - near < settings.template.far_miss_factor * (1.0 - far);
     near >= far || (near >= settings.limits.far_ncc_min && is_nearly_alike)
 }
 
-/// Whether a match is better than another one that stands so far.
+/// Whether a match is better than the best one so far.
 pub(super) fn is_better(first: &FirstMatch, best: &FirstMatch, input: &LocateInput<'_>) -> bool {
     let (score, its_score) = (first.peak.score, best.peak.score);
     let far = |first: &FirstMatch| is_used(first, input) && is_far_peak(&first.peak, input);
@@ -64,7 +64,7 @@ pub(super) fn is_better(first: &FirstMatch, best: &FirstMatch, input: &LocateInp
     }
 }
 
-/// Moves a match that is far from the prediction to the highest maximum near it, if that is taken instead.
+/// Moves a match that is far from the prediction to the highest maximum near it, if that is preferred.
 pub(super) fn prefer_near(first: &mut FirstMatch, input: &LocateInput<'_>) {
     if !is_used(first, input) || !is_far_peak(&first.peak, input) {
         return;

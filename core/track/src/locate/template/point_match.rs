@@ -26,10 +26,10 @@ pub struct PointMatch {
     pub at_end: bool,
 }
 
-/// Finds the left pixel's point in the right image.
+/// Matches the left pixel in the right image.
 ///
 /// # Errors
-/// [`TemplateFailure`] where there is nothing to compare.
+/// [`TemplateFailure`] if there is nothing to compare.
 pub fn point_match(
     input: &StereoInput<'_>,
     settings: &TemplateSettings,

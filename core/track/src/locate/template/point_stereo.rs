@@ -1,25 +1,23 @@
-//! Step `point_stereo`: the one target point in the right image, along the epipolar curve (K§4.4, R73–R76).
+//! Step `point_stereo`: matches the target in the right image, along the epipolar curve (K§4.4, R73–R76).
 //!
-//! The left pixel's ray, sampled by range, projects into the right image as a curve; with real models it is
+//! The left pixel's ray, sampled by range, projects into the right image as a curve; with real camera models it is
 //! not an image row (E38). Along that curve, and up to the tolerance to either side of it, the left window is
-//! compared with right windows by normalised correlation (R76). Each right window is resampled through
-//! `A = ∂right/∂left` at the candidate's range, so that cameras which are turned against each other still see
-//! the same patch; for two parallel eyes A is the identity. The best position is refined by a quadratic fit
-//! along and across the curve, and then followed to the next maximum of scores that count the window's centre
-//! most (`correlate::focus`).
+//! compared with right windows by normalised correlation (R76). Each right window is resampled through `A =
+//! ∂right/∂left` at the candidate's range, so that cameras rotated against each other still see the same patch; for
+//! two parallel cameras A is the identity. The best position is refined by a quadratic fit along and across the
+//! curve, and then moved to the next maximum of scores that weight the window's centre most (`correlate::focus`).
 //!
-//! The interval searched is one of disparity for two eyes side by side: as wide as half the search window,
-//! centred on the predicted range (R74, R75, E13), and the whole of the curve at designation or where the two
-//! views are free. The slope of the surface (how the right position moves when the left one does) comes from
-//! the same search at four neighbours: it turns an error of the left pixel into one of range, and with
-//! `surface_warp` the windows near the best position are compared once more, resampled as on that surface; the
-//! better score stands. Where the neighbours say nothing, as on a narrow face, the slope is that of an earlier stop, carried by the
-//! poses. `stereo_search` says how the windows are compared.
+//! For two cameras side by side, the searched interval is one of disparity, `disparity_range_px` wide and centred on
+//! the predicted range (R74, R75, E13); otherwise, and at the designation, it is the whole curve. The slope of the
+//! surface (how the right position moves with the left one) is measured by the same search at four neighbours: it
+//! propagates an error of the left pixel to the range. With `surface_warp` the windows near the best position are
+//! compared again, resampled for that surface; the better score wins. If the neighbours give no slope, as on a narrow
+//! face, that of an earlier stop is used, carried by the poses. `stereo_search` compares the windows.
 //!
-//! **Left–right check.** The right pixel is looked for in the left image in the same way, with the eyes exchanged and
-//! the surface seen from the other side. How far from the first pixel it leads is recorded: a wrong match seldom
-//! leads back. It becomes a criterion with `left_right_max_px`. **Disparity** is the arc length from where a point
-//! at infinity would lie, for two parallel eyes the difference of the columns.
+//! **Left–right check.** The right pixel is matched in the left image in the same way, with the cameras exchanged and
+//! the surface seen from the other side. The distance of that match from the first pixel is recorded: a wrong match
+//! seldom returns to it. It becomes a gate with `left_right_max_px`. **Disparity** is the arc length from the image
+//! of a point at infinity; for two parallel cameras it is the difference of the columns.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -47,10 +45,10 @@ use sightline_vision::image::resample;
 /// Distance of the neighbours from which the slope is measured, px in the left image.
 const SLOPE_BASE_PX: f64 = 8.0;
 
-/// How far along the curve a neighbour's match may differ from the target's, px.
+/// Largest distance along the curve between a neighbour's match and the target's, px.
 const SLOPE_REACH_PX: f64 = 5.0;
 
-/// A neighbour below this score says nothing about the slope.
+/// Smallest score of a neighbour that is used for the slope.
 const SLOPE_SCORE_MIN: f32 = 0.6;
 
 /// The corresponding point in the right image.
@@ -60,16 +58,16 @@ pub struct PointStereo {
     pub curve: Vec<CurvePoint>,
     /// The best position, px.
     pub right_pixel: Pixel,
-    /// Its score.
+    /// Score of the best position.
     pub score: f64,
     /// Its range along the left ray on the curve, m.
     pub range_m: f64,
-    /// Disparity: the way along the curve from where a point at infinity would lie, px.
+    /// Disparity: arc length from the image of a point at infinity, px; null if that is not visible.
     #[serde(default)]
     pub disparity_px: Option<f64>,
-    /// How far it lies beside the curve, px.
+    /// Signed distance from the curve, px.
     pub across_px: f64,
-    /// How far from the left pixel the right one leads back to, px; null where nothing was found there.
+    /// Distance between the left pixel and the match of the right one in the left image, px; null without such a match.
     #[serde(default)]
     pub left_right_px: Option<f64>,
     /// Whether the best position is at an end of the searched interval.
@@ -77,22 +75,22 @@ pub struct PointStereo {
     /// Covariance of the right position for a given left one, px².
     #[schema(value_type = Vec<f64>)]
     pub covariance_px2: Matrix2<f64>,
-    /// How the right position moves with the left one on the target's surface, px per px.
+    /// Derivative of the right position with respect to the left one on the target's surface, px per px.
     #[schema(value_type = Vec<f64>)]
     pub right_from_left: Matrix2<f64>,
-    /// The right image at the match, resampled as the left sees it.
+    /// The right image at the match, resampled to the left view.
     #[serde(skip)]
     #[schema(ignore)]
     pub right_window: Unsent<Patch>,
 }
 
-/// A slope that stretches the window by more than this is not believed, px per px.
+/// Largest accepted stretch of the window by a slope, px per px.
 pub(super) const STRETCH_LIMIT: f64 = 1.0;
 
-/// Finds the left pixel's point in the right image.
+/// Matches the left pixel in the right image.
 ///
 /// # Errors
-/// A sentence saying why there is nothing to compare.
+/// Why there is nothing to compare.
 pub fn point_stereo(
     input: &StereoInput<'_>,
     settings: &TemplateSettings,
@@ -144,7 +142,7 @@ pub fn point_stereo(
     })
 }
 
-/// The whole epipolar curve, or the image row in its place.
+/// The whole epipolar curve, or the image row instead.
 pub(super) fn curve(input: &StereoInput<'_>, settings: &TemplateSettings) -> Option<Curve> {
     let mut curve = Curve::new(&curve_input(input, settings))?;
     if settings.stereo_reference == StereoReference::ImageRow {
@@ -188,8 +186,8 @@ pub(super) fn search_interval(
     if cut.0 < cut.1 { Ok(cut) } else { Err(TemplateFailure::IntervalOffCurve) }
 }
 
-/// The best position once more, near where it was, with windows resampled as on a surface of this slope; what
-/// was found before stands unless that scores better.
+/// Repeats the search near the best position, with windows resampled for a surface of this slope; keeps the first
+/// result if that scores more.
 fn on_surface<'a>(
     facing: Windows<'a>,
     (from, to): (f64, f64),
@@ -207,8 +205,8 @@ fn on_surface<'a>(
     }
 }
 
-/// How the place on the curve moves with the left pixel, from the matches of four neighbours of the target, px per
-/// px; beside what a surface that faces the camera makes it.
+/// Derivative of the arc length with respect to the left pixel, from the matches of four neighbours of the target, px
+/// per px; relative to that of a surface that faces the camera.
 fn surface_slope(
     curve: &Curve,
     along: f64,
@@ -238,7 +236,7 @@ fn surface_slope(
         let best = windows.place(interval)?;
         (best.score as f32 >= SLOPE_SCORE_MIN && !best.at_end).then_some(best.along - expected)
     };
-    // Opposite neighbours of a plane lie as far on either side of the target, which is at 0; at an edge they do not.
+    // On a plane, opposite neighbours have opposite offsets from the target, which is at 0; at a depth edge they do not.
     let slope = |a: Option<f64>, b: Option<f64>| {
         let (a, b) = (a?, b?);
         let bend_px = (a + b).abs() / 2.0;
@@ -249,7 +247,7 @@ fn surface_slope(
     Some(RowVector2::new(du, dv))
 }
 
-/// The same from the surface of an earlier stop.
+/// The same derivative from the surface of an earlier stop.
 fn carried_slope(curve: &Curve, along: f64, input: &StereoInput<'_>) -> Option<RowVector2<f64>> {
     let (_, range_m) = curve.at(along, 0.0);
     let point = input.left.ray(input.left_pixel)?.at(range_m);
@@ -265,8 +263,8 @@ pub(super) struct Found {
     pub(super) right_from_left: Matrix2<f64>,
 }
 
-/// The left pixel to which the right one leads back, searched as the right one was, with the eyes exchanged; `None`
-/// where there is nothing to compare.
+/// Matches the right pixel in the left image, by the same search with the cameras exchanged; `None` if there is
+/// nothing to compare.
 pub(super) fn left_again(
     input: &StereoInput<'_>,
     found: &Found,
@@ -332,7 +330,7 @@ impl Record for PointStereo {
     }
 }
 
-/// The arrays of this stage that panels draw by themselves.
+/// Names of the arrays of this stage that a panel draws individually.
 impl ArrayName {
     /// The right image at the stereo match.
     pub const RIGHT_WINDOW: Self = Self::new("right_window");

@@ -1,7 +1,8 @@
 //! Relief: the ranges of the target's neighbours, each by point stereo (R21, R220).
 //!
-//! Neighbours lie on a grid of three by three. Each is matched with a window of half the template's side that lies wholly
-//! inside the template's, so that nothing beside the target is taken for it. One whose match is not sure has no range.
+//! The neighbours form a grid of three by three. Each is matched with a window of half the template's side that is
+//! wholly inside the template's, so that it contains nothing beside the target. A neighbour without a reliable match
+//! has no range.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -10,7 +11,7 @@ use super::point_stereo::{StereoInput, point_stereo};
 use super::settings::TemplateSettings;
 use sightline_geometry::frames::{Pixel, Point3};
 
-/// Neighbours that score less say nothing about the range.
+/// Smallest score of a neighbour with a range.
 const SCORE_MIN: f64 = 0.6;
 
 /// The surface around a target.
@@ -19,7 +20,7 @@ pub struct Relief {
     /// The target in the rover frame of its stop, m.
     #[schema(value_type = [f64; 3])]
     pub middle: Point3,
-    /// Its neighbours in the window, as far as stereo was sure, m.
+    /// Its neighbours in the window with a reliable match, m.
     #[schema(value_type = Vec<[f64; 3]>)]
     pub neighbours: Vec<Point3>,
 }
@@ -37,7 +38,7 @@ pub(super) fn around(size: u32) -> Vec<[f64; 2]> {
     all.filter(|offset| *offset != [0.0, 0.0]).collect()
 }
 
-/// The range at a pixel of the left image, m, near `range_m`; `None` where its match is not sure.
+/// The range at a pixel of the left image, m, near `range_m`; `None` without a reliable match.
 pub(super) fn range_at(
     input: &StereoInput<'_>,
     left_pixel: Pixel,

@@ -1,4 +1,4 @@
-//! Step `scale_roll`: the template as the target should look now (K§4.3.1, K-Eq 6–10, R48–R59).
+//! Step `scale_roll`: predicts the appearance of the template at the current stop (K§4.3.1, K-Eq 6–10, R48–R59).
 //!
 //! ```text
 //! s     = |p_old − C_old| / |p_new − C_new|                      K-Eq 6
@@ -6,24 +6,24 @@
 //! p_adj = p_0 + k H_x,  k = 0.05 m                               K-Eq 10
 //! ρ     = atan2(dy, dx) of p_0 → p_adj in the new left image, clockwise on screen positive (R56)
 //! ```
-//! The window keeps its size in pixels; the image content is magnified by s and turned by ρ (R51, R58).
-//! Only the prediction is used, never the stereo result to come (R50). Scale and roll do not compensate
-//! out-of-plane change (R60). Where stereo measured the slope of the target's surface, the map between the two
-//! images is known to first order,
+//! The window keeps its size in pixels; the image content is magnified by s and rotated by ρ (R51, R58). Only the
+//! prediction is used, never the stereo result that follows (R50). Scale and roll do not compensate out-of-plane
+//! change (R60). If stereo measured the slope of the target's surface, the map between the two images is known to
+//! first order,
 //! ```text
 //! F = ∂pixel_new/∂p · R · ∂p/∂pixel_old
 //! ```
-//! and with `surface_warp` the window is resampled through F instead: foreshortening changes with the line of
-//! sight, most on surfaces seen at a grazing angle. Where the window covers two surfaces, as at the foot of a rock, the
-//! slope between them is that of neither; so both windows are matched, and the better match stands (`choose`). With
-//! `warp_model = homography` each pixel goes through the plane of the surface and both camera models instead
-//! (`window_map`). `image_from_template` is F (or s R(ρ) where the slope is not known, or the window without it matches
-//! better), which also carries the uncertainty of the target's position in the image.
+//! and with `surface_warp` the window is resampled through F instead: foreshortening changes with the line of sight,
+//! most on surfaces seen at a grazing angle. If the window covers two surfaces, as at the foot of a rock, the
+//! measured slope fits neither; so both windows are matched, and the better match is used (`choose`). With
+//! `warp_model = homography` each pixel is mapped through the plane of the surface and both camera models instead
+//! (`window_map`). `image_from_template` is F, or s R(ρ) if the slope is unknown or the window without it matches
+//! better; it also propagates the uncertainty of the target's position in the image.
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
 //! | p_old, C_old | `appearance.position_in_rover`, `appearance.camera` | m, rover frame of the template's stop |
-//! | p_new, C_new | `now_from_template * p_old`, `left` | m, present rover frame |
+//! | p_new, C_new | `now_from_template * p_old`, `left` | m, current rover frame |
 //! | s | `scale` | – |
 //! | ρ | `roll_rad` | rad |
 //! | R | rotation of `now_from_template` | – |
@@ -46,24 +46,24 @@ use sightline_vision::image::patch::{self, Patch};
 /// Length of the helper vector, m (K-Eq 10).
 const HELPER_LENGTH_M: f64 = 0.05;
 
-/// A slope that stretches the template by more than this beside scale and roll is not believed, px per px. The window that is
-/// only scaled and rolled is compared, too, so that the limit merely leaves out slopes that were measured wrongly.
+/// Largest accepted stretch of the template by a slope, beyond scale and roll, px per px. The window that is only
+/// scaled and rolled is compared as well, so the limit excludes only wrongly measured slopes.
 const STRETCH_LIMIT: f64 = 1.0;
 
-/// A template is scaled by at most this, and by at least its inverse.
+/// Largest scale of a template; its inverse is the smallest.
 ///
-/// Magnified more, the default window shows a single pixel of its source; shrunk more, its source is larger than most
-/// images. Distances that differ so much come from wrong poses.
+/// Magnified more, the default window contains a single pixel of its source; shrunk more, its source is larger than
+/// most images. Such ratios of distances come from wrong poses.
 const SCALE_MAX: f64 = 20.0;
 
-/// How the window of an appearance is prepared.
+/// The preparation of an appearance's window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Preparation {
-    /// Warped by the slope of the surface where `surface_warp` is on and stereo measured one; otherwise scaled and rolled.
+    /// Warped by the slope of the surface if `surface_warp` is on and stereo measured one; otherwise scaled and rolled.
     Surface,
     /// Scaled and rolled by the geometry, without the slope of the surface.
     ScaleRoll,
-    /// Scaled and rolled by given amounts, without geometry and switches (R224).
+    /// Scaled and rolled by given amounts, independent of the geometry and of the settings `scale` and `roll` (R224).
     Given {
         /// Scale.
         scale: f64,
@@ -91,10 +91,11 @@ pub struct ScaleRoll {
     pub new_distance_m: f64,
     /// The stop at which the template was taken.
     pub template_step: usize,
-    /// How offsets in the old image move on the target's surface, px per px; `s R(ρ)` where its slope is not known.
+    /// Maps offsets in the old image to the current one on the target's surface, px per px; `s R(ρ)` if its slope is
+    /// unknown.
     #[schema(value_type = Vec<f64>)]
     pub image_from_template: Matrix2<f64>,
-    /// The window as it was in the image from which it was taken.
+    /// The window in the image from which it was taken.
     #[serde(skip)]
     #[schema(ignore)]
     pub reference: Unsent<Patch>,
@@ -102,14 +103,14 @@ pub struct ScaleRoll {
     #[serde(skip)]
     #[schema(ignore)]
     pub scaled: Unsent<Patch>,
-    /// The window after scaling and rolling, or after warping: what is matched.
+    /// The window after scaling and rolling, or after warping; this one is matched.
     #[serde(skip)]
     #[schema(ignore)]
     pub rolled: Unsent<Patch>,
 }
 
 impl ScaleRoll {
-    /// How the template was prepared: `s R(ρ)`, or F where it was warped, px per px.
+    /// The map that prepared the template: `s R(ρ)`, or F if it was warped, px per px.
     pub fn prepared_from_template(&self) -> Matrix2<f64> {
         if self.warped {
             return self.image_from_template;
@@ -117,7 +118,7 @@ impl ScaleRoll {
         Rotation2::new(self.applied_roll_rad).into_inner() * self.applied_scale
     }
 
-    /// How the template was prepared, to prepare it once more.
+    /// The preparation that reproduces the template.
     pub fn preparation(&self) -> Preparation {
         match self.warped {
             true => Preparation::Surface,
@@ -125,15 +126,14 @@ impl ScaleRoll {
         }
     }
 
-    /// By how much the surface stretches the prepared template further: `F (s R)⁻¹ − I`, px per px; 0 where it
-    /// was warped.
+    /// Stretch by the surface that the prepared template lacks: `F (s R)⁻¹ − I`, px per px; 0 if it was warped.
     pub fn misfit(&self) -> Matrix2<f64> {
         let inverse = self.prepared_from_template().try_inverse().unwrap_or_else(Matrix2::identity);
         self.image_from_template * inverse - Matrix2::identity()
     }
 }
 
-/// How offsets in the old image move on the target's surface: `∂pixel_new/∂p · R · ∂p/∂pixel_old`, px per px.
+/// Maps offsets in the old image to the current one on the target's surface: `∂pixel_new/∂p · R · ∂p/∂pixel_old`, px per px.
 fn surface_map(appearance: &Appearance, now_from_template: &Pose, left: &Camera) -> Option<Matrix2<f64>> {
     let slope = appearance.surface_by_pixel?;
     let (_, jacobian) =
@@ -141,8 +141,8 @@ fn surface_map(appearance: &Appearance, now_from_template: &Pose, left: &Camera)
     Some(jacobian * now_from_template.rotation.to_rotation_matrix().matrix() * slope)
 }
 
-/// How the surface point moves with the present left pixel, as it was measured when the template was taken: `R · ∂p/∂pixel_old · F⁻¹`,
-/// present rover frame, m per px.
+/// Derivative of the surface point with respect to the current left pixel, as measured when the template was taken:
+/// `R · ∂p/∂pixel_old · F⁻¹`, current rover frame, m per px.
 pub(super) fn carried_surface(
     appearance: &Appearance,
     now_from_template: &Pose,
@@ -153,7 +153,7 @@ pub(super) fn carried_surface(
     Some(rotation.matrix() * appearance.surface_by_pixel? * old_from_new)
 }
 
-/// Whether a surface map stretches the template beside scale and roll no more than is believed.
+/// Whether a surface map stretches the template beyond scale and roll by at most `STRETCH_LIMIT`.
 fn is_believed(map: &Matrix2<f64>, similarity: &Matrix2<f64>) -> bool {
     let inverse = similarity.try_inverse();
     inverse.is_some_and(|inverse| (map * inverse - Matrix2::identity()).norm() <= STRETCH_LIMIT)
@@ -162,7 +162,7 @@ fn is_believed(map: &Matrix2<f64>, similarity: &Matrix2<f64>) -> bool {
 /// The scale and roll of the geometry alone: `(s, ρ in rad, D_old in m, D_new in m)`.
 ///
 /// # Errors
-/// A sentence when the prediction lies behind the camera.
+/// If the prediction is behind the camera.
 pub fn geometry(
     position_then: &Point3,
     camera_then: &Camera,
@@ -187,10 +187,10 @@ pub fn geometry(
     Ok((old_distance_m / new_distance_m, now - then, old_distance_m, new_distance_m))
 }
 
-/// Scales and rolls the template of `appearance` for the present left camera, or warps it by its surface.
+/// Scales and rolls the template of `appearance` for the current left camera, or warps it by its surface.
 ///
 /// # Errors
-/// A sentence saying why there is no template.
+/// Why there is no template.
 pub fn scale_roll<'a>(
     appearance: &'a Appearance,
     now_from_template: &Pose,
@@ -216,7 +216,7 @@ pub fn scale_roll<'a>(
     let (image, pixel) = (appearance.image.as_ref(), appearance.pixel);
     let (size, kernel) = (settings.template_size_px, settings.kernel);
     let similarity = Rotation2::new(roll_rad).into_inner() * scale;
-    // Where the window that is only scaled and rolled matches better, it is the better map too.
+    // If the window that is only scaled and rolled matches better, its map is the better one too.
     let surface = surface_map(appearance, now_from_template, left)
         .filter(|map| preparation != Preparation::ScaleRoll && is_believed(map, &similarity));
     let is_wanted =
@@ -252,7 +252,7 @@ pub fn scale_roll<'a>(
     })
 }
 
-/// The prepared template with where it comes from, so that its surroundings can be prepared as it was.
+/// The prepared template and its source, from which its surroundings can be prepared in the same way.
 #[derive(Clone, Debug)]
 pub struct Prepared<'a> {
     /// The record of the step.
@@ -306,13 +306,13 @@ impl Record for ScaleRoll {
     }
 }
 
-/// The arrays of this stage that panels draw by themselves.
+/// Names of the arrays of this stage that a panel draws individually.
 impl ArrayName {
     /// The template as it was taken.
     pub const REFERENCE: Self = Self::new("reference");
     /// The template, scaled.
     pub const SCALED: Self = Self::new("scaled");
-    /// The template, scaled and rolled: what was matched.
+    /// The template, scaled and rolled, as it was matched.
     pub const ROLLED: Self = Self::new("rolled");
 }
 
@@ -353,7 +353,7 @@ mod tests {
         assert!(((roll - against_old).to_degrees() + 0.0237861221).abs() < 1e-6);
     }
 
-    /// A face that turns away while the rover comes nearer: at half a pixel per pixel its template is still of use.
+    /// A face that turns away while the rover approaches: at half a pixel per pixel its template is still usable.
     #[test]
     fn a_template_is_warped_by_slopes_of_up_to_one_pixel_per_pixel() {
         let similarity = Rotation2::new(0.3).into_inner() * 1.38;

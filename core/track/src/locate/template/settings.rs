@@ -11,10 +11,10 @@ use sightline_vision::correlate::sdog::Sdog;
 use sightline_vision::correlate::similarity::Similarity;
 use sightline_vision::image::sample::Kernel;
 
-/// Side below which a template at the coarsest level tells nothing apart, px.
+/// Smallest side of a template at the coarsest level, px; a smaller one is not distinctive.
 const COARSEST_MIN_PX: u32 = 5;
 
-/// Most pairs of a scale and a roll that a brute-force search tries.
+/// Largest number of pairs of scale and roll in a brute-force search.
 const PAIRS_MAX: u64 = 2000;
 
 settings_group! {
@@ -140,7 +140,7 @@ impl TemplateSettings {
         }
     }
 
-    /// How a coarse-to-fine search descends.
+    /// The settings of a coarse-to-fine search.
     pub fn descent(&self) -> Descent {
         Descent {
             levels: self.coarse_levels,
@@ -149,9 +149,9 @@ impl TemplateSettings {
         }
     }
 
-    /// How many scales and how many rolls a brute-force search tries to either side of none.
+    /// Number of scales and of rolls that a brute-force search tries to either side of the identity.
     pub fn search_steps(&self) -> [i32; 2] {
-        // A hair more, so that a range which is a whole number of steps keeps its last.
+        // The margin keeps the last step of a range that is a whole number of steps.
         let count = |range: f64, step: f64| (range / step + 1e-9).floor() as i32;
         [
             count(self.search_scale_max.ln(), self.search_scale_ratio.ln()),
@@ -159,12 +159,12 @@ impl TemplateSettings {
         ]
     }
 
-    /// How many pairs of a scale and a roll it tries.
+    /// Number of pairs of scale and roll in that search.
     fn pairs(&self) -> u64 {
         self.search_steps().iter().map(|steps| 2 * u64::from(steps.unsigned_abs()) + 1).product()
     }
 
-    /// Why these settings cannot find anything, as one sentence that names the fields and the way out.
+    /// Returns why these settings can find nothing, as one sentence that names the fields and the remedy.
     pub fn contradiction(&self) -> Option<String> {
         let (template, window) = (self.template_size_px, self.search_window_px);
         if template.is_multiple_of(2) || window.is_multiple_of(2) {

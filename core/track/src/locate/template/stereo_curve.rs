@@ -1,19 +1,19 @@
 //! The epipolar curve of one left pixel in the right image, by arc length.
 //!
-//! The curve is sampled at equal steps of inverse range (which are nearly equal steps of disparity), far end
-//! first, and parameterised by its arc length in the right image. `∂right/∂left` at a range is taken by central
-//! differences of left ray → point at that range → right pixel: the local map between the two views of a
-//! patch that faces the left camera.
+//! The curve is sampled at equal steps of inverse range (which are nearly equal steps of disparity), far end first,
+//! and parameterised by its arc length in the right image. `∂right/∂left` at a range is computed by central
+//! differences of left ray → point at that range → right pixel: the local map between the two views of a patch that
+//! faces the left camera.
 
 use nalgebra::{Matrix2, Vector2};
 
 use sightline_geometry::camera::Camera;
 use sightline_geometry::frames::{Pixel, Ray};
 
-/// A range that no disparity tells from infinity, m.
+/// A range whose disparity is that of infinity, m.
 const INFINITY_M: f64 = 1e9;
 
-/// Samples of the curve; between them it is taken as straight, which errs by less than 1e-3 px.
+/// Number of samples of the curve; linear interpolation between them errs by less than 1e-3 px.
 const SAMPLES: usize = 256;
 
 /// A sampled epipolar curve.
@@ -22,18 +22,18 @@ pub struct Curve {
     pixels: Vec<Pixel>,
     inverse_ranges: Vec<f64>,
     arc_px: Vec<f64>,
-    /// Where a point without end of range would lie, px.
+    /// Pixel of a point at infinity, px; `None` if not visible.
     infinity: Option<Pixel>,
     /// Rays of the four neighbours of the left pixel, a pixel away: left, right, above, below.
     around: Option<[Ray; 4]>,
 }
 
-/// What a curve is made from.
+/// The input of a curve.
 #[derive(Clone, Copy, Debug)]
 pub struct CurveInput<'a> {
     /// The camera of the pixel.
     pub left: &'a Camera,
-    /// The camera in whose image the curve lies, same frame.
+    /// The camera whose image contains the curve, same frame.
     pub right: &'a Camera,
     /// The pixel, px.
     pub left_pixel: Pixel,
@@ -47,7 +47,7 @@ impl CurveInput<'_> {
         far + (near - far) * sample as f64 / (SAMPLES - 1) as f64
     }
 
-    /// Inverse range and pixel of a sample, where it is visible.
+    /// Inverse range and pixel of a sample; `None` if not visible.
     fn sample(&self, ray: &Ray, sample: usize) -> Option<(f64, Pixel)> {
         let inverse = self.inverse_range(sample);
         Some((inverse, self.right.project(&ray.at(1.0 / inverse))?))
@@ -55,14 +55,14 @@ impl CurveInput<'_> {
 }
 
 impl Curve {
-    /// The curve of a left pixel between two ranges; none when fewer than two samples are visible.
+    /// The curve of a left pixel between two ranges; `None` if fewer than two samples are visible.
     pub fn new(input: &CurveInput<'_>) -> Option<Self> {
         let ray = input.left.ray(input.left_pixel)?;
         Self::through(input, &ray, (0..SAMPLES).filter_map(|sample| input.sample(&ray, sample)))
     }
 
-    /// The part of the curve around one range, at least `reach_px` to either side where there is so much of it; none
-    /// when that range is not visible.
+    /// The part of the curve around one range, at least `reach_px` to either side if the curve is that long; `None`
+    /// if that range is not visible.
     pub fn near(input: &CurveInput<'_>, range_m: f64, reach_px: f64) -> Option<Self> {
         let ray = input.left.ray(input.left_pixel)?;
         let (far, step) = (input.inverse_range(0), input.inverse_range(1) - input.inverse_range(0));
@@ -117,7 +117,7 @@ impl Curve {
         (curve.pixels.len() >= 2 && curve.length_px() > 0.0).then_some(curve)
     }
 
-    /// Lays the curve on one image row: the literal reading of the paper (E38).
+    /// Replaces the curve by one image row: the literal reading of the paper (E38).
     pub fn flatten_to_row(&mut self, y: f64) {
         for pixel in self.pixels.iter_mut().chain(&mut self.infinity) {
             pixel.y = y;
@@ -127,12 +127,12 @@ impl Curve {
         }
     }
 
-    /// Its length, px.
+    /// Length of the curve, px.
     pub fn length_px(&self) -> f64 {
         self.arc_px.last().copied().unwrap_or(0.0)
     }
 
-    /// Arc length of disparity zero, px: negative, because it lies beyond the far end; `None` where it is not visible.
+    /// Arc length of disparity zero, px: negative, because it is beyond the far end; `None` if not visible.
     pub fn along_of_infinity(&self) -> Option<f64> {
         Some(-self.infinity?.distance(*self.pixels.first()?))
     }
@@ -154,7 +154,7 @@ impl Curve {
         Vector2::new(b.x - a.x, b.y - a.y).try_normalize(1e-12).unwrap_or_else(Vector2::x)
     }
 
-    /// The arc length of a range, px; ends of the curve for ranges beyond them.
+    /// The arc length of a range, px, clamped to the ends of the curve.
     pub fn along_of_range(&self, range_m: f64) -> f64 {
         let inverse = 1.0 / range_m;
         let i = self.inverse_ranges.partition_point(|&v| v < inverse).clamp(1, self.pixels.len() - 1) - 1;
@@ -173,7 +173,7 @@ impl Curve {
         columns.map_or_else(Matrix2::identity, |columns| Matrix2::from_columns(&columns))
     }
 
-    /// The segment that holds an arc length, and the fraction within it.
+    /// The segment that contains an arc length, and the fraction within it.
     fn segment(&self, along: f64) -> (usize, f64) {
         let i = self.arc_px.partition_point(|&v| v <= along).clamp(1, self.pixels.len() - 1) - 1;
         let length = self.arc_px[i + 1] - self.arc_px[i];

@@ -22,21 +22,22 @@ pub struct StereoInput<'a> {
     pub left: &'a Camera,
     /// The right camera, rover frame.
     pub right: &'a Camera,
-    /// How the two images relate.
+    /// The relation of the two views.
     pub geometry: StereoGeometry,
-    /// Predicted distance from the left camera, m; null at designation.
+    /// Predicted distance from the left camera, m; `None` at the designation.
     pub predicted_range_m: Option<f64>,
-    /// How the surface point moves with the left pixel, as an earlier stop measured it, rover frame, m per px; `None` where it did not.
+    /// Derivative of the surface point with respect to the left pixel, measured at an earlier stop, rover frame, m
+    /// per px; `None` without one.
     pub surface_by_pixel: Option<Matrix3x2<f64>>,
 }
 
 /// One candidate on the epipolar curve.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct CurvePoint {
-    /// Where it lies in the right image, px.
+    /// Position in the right image, px.
     pub pixel: Pixel,
     /// Range along the left ray, m.
     pub range_m: f64,
-    /// Best score within the tolerance across the curve; null where no window fits.
+    /// Best score within the tolerance across the curve; null if no window fits.
     pub score: Option<f32>,
 }

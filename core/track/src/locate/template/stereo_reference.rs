@@ -1,4 +1,4 @@
-//! The definition of point stereo, window by window, against which the quick search is held.
+//! The definition of point stereo, window by window: the reference for the fast search.
 
 use super::*;
 use crate::locate::template::match_noise::match_noise;
@@ -8,7 +8,7 @@ use sightline_vision::correlate::zncc::zncc;
 use sightline_vision::image::patch;
 use sightline_vision::image::sample::Kernel;
 
-/// What both must agree in.
+/// The results in which both must agree.
 pub(super) struct Answer {
     pub(super) right_pixel: Pixel,
     pub(super) score: f64,
@@ -18,7 +18,7 @@ pub(super) struct Answer {
     pub(super) profile: Vec<Option<f32>>,
 }
 
-/// One search: every candidate by its own window, read pixel by pixel.
+/// One search: every candidate has its own window, resampled pixel by pixel.
 #[derive(Clone, Copy)]
 struct Direct<'a> {
     curve: &'a Curve,

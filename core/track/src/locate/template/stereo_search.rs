@@ -1,22 +1,22 @@
-//! Windows along an epipolar curve, compared with one template: the work of `point_stereo` and its left–right check.
+//! Compares windows along an epipolar curve with one template, for `point_stereo` and its left–right check.
 //!
-//! Candidates lie a pixel apart along the curve and across it. Each has a window of its own, resampled through
-//! `A = ∂right/∂left` at its range, so that neighbouring windows share no sample, and hundreds of them would have to
-//! be read one by one. Instead the image is read once into a *strip* rectified along the curve, in which the windows
-//! of all candidates are slices, and the template is read on the strip's grid: with tangent T and normal N,
+//! Candidates are a pixel apart along the curve and across it. Each has its own window, resampled through `A =
+//! ∂right/∂left` at its range, so that neighbouring windows share no sample, and hundreds of them would have to be
+//! resampled one by one. Instead the image is resampled once into a *strip* rectified along the curve, in which the
+//! windows of all candidates are slices, and the template is resampled on the strip's grid: with tangent T and normal N,
 //! ```text
 //! strip(i, j) = image(curve(i) + j N)            template'(i, j) = left image(centre + A⁻¹ (i T, j N))
 //! ```
-//! The dense correlator (`correlate::zncc`) scores the strip. It differs from the windows of the definition by the
-//! outline of the template, which is turned by as much as T is against A's axes, and by which of the two images is
-//! interpolated: some thousandths. Every candidate within [`DOUBT`] of the best, its eight neighbours, and every one
-//! that the strip cannot score is therefore compared once more by the definition, until the best and its neighbours
-//! all are; position, fit and covariance come from these scores alone. Along a stretch whose maps differ by less than
-//! [`SHARED_MAP_PX`] one template' serves; where A turns or stretches the window against the curve by more than
-//! [`STRIP_DISTORTION`], the definition serves alone.
+//! The dense correlator (`correlate::zncc`) scores the strip. It differs from the windows of the definition in the
+//! outline of the template, which is rotated by the angle between T and A's axes, and in which of the two images is
+//! interpolated: by some thousandths. Therefore every candidate within [`DOUBT`] of the best, its eight neighbours,
+//! and every one that the strip cannot score are compared again by the definition, until the best and its neighbours
+//! all are; position, fit and covariance use these scores only. One template' serves a stretch of the curve whose
+//! maps differ by less than [`SHARED_MAP_PX`]; where A rotates or stretches the window against the curve by more than
+//! [`STRIP_DISTORTION`], only the definition is used.
 //!
-//! The search in focus (`correlate::focus`) reads the image once around the best candidate, on the grid of A itself,
-//! and climbs over windows that are slices of that; on a slope its windows are read one by one.
+//! The focused search (`correlate::focus`) resamples the image once around the best candidate, on the grid of A
+//! itself, and climbs over windows that are slices of that; on a slope its windows are resampled one by one.
 
 use nalgebra::{Matrix2, Matrix3, RowVector2, Vector2};
 
@@ -33,16 +33,16 @@ use sightline_vision::image::{GrayImage, PixelRect, resample};
 /// Candidates whose score in the strip is less than this below the best are compared by the definition.
 const DOUBT: f32 = 0.02;
 
-/// How far the rim of a window may move between the maps of candidates that share a template, px.
+/// Largest shift of a window's border between the maps of candidates that share a template, px.
 const SHARED_MAP_PX: f64 = 0.05;
 
-/// How far A may differ from the strip's axes, px per px, quarter turns apart.
+/// Largest difference between A and the strip's axes, up to quarter turns, px per px.
 const STRIP_DISTORTION: f64 = 0.1;
 
-/// How far around the best candidate the image is read in advance for the search in focus, px.
+/// Distance around the best candidate within which the image is resampled in advance for the focused search, px.
 const FOCUS_REACH_PX: i32 = 3;
 
-/// A score at a place along and across the curve.
+/// A candidate: position along and across the curve, px, and score.
 #[derive(Clone, Copy)]
 pub(super) struct Best {
     pub(super) along: f64,
@@ -51,7 +51,7 @@ pub(super) struct Best {
     pub(super) at_end: bool,
 }
 
-/// A template with what its comparisons share.
+/// A template with the data that its comparisons share.
 pub(super) struct StereoTemplate<'a> {
     patch: Patch,
     reference: Reference,
@@ -59,7 +59,7 @@ pub(super) struct StereoTemplate<'a> {
 }
 
 impl<'a> StereoTemplate<'a> {
-    /// `None` when the patch has an invalid pixel.
+    /// `None` if the patch has an invalid pixel.
     pub(super) fn new(patch: Patch, focus: &'a Focus) -> Option<Self> {
         let reference = Reference::new(&patch)?;
         Some(Self { patch, reference, focus })
@@ -70,14 +70,14 @@ impl<'a> StereoTemplate<'a> {
     }
 }
 
-/// The windows of the right image that a template is compared with, each resampled as the left camera sees it on
-/// a surface of one slope.
+/// The windows of the right image that are compared with a template, each resampled to the left view of a surface of
+/// one slope.
 #[derive(Clone, Copy)]
 pub(super) struct Windows<'a> {
     pub(super) curve: &'a Curve,
     pub(super) template: &'a StereoTemplate<'a>,
     pub(super) input: &'a StereoInput<'a>,
-    /// How the place on the curve moves with the left pixel beside what a facing surface makes it, px per px.
+    /// Derivative of the arc length with respect to the left pixel, relative to that of a facing surface, px per px.
     pub(super) slope: RowVector2<f64>,
     /// Tolerance across the curve, px.
     pub(super) tolerance_px: f64,
@@ -91,12 +91,12 @@ impl Windows<'_> {
         self.curve.right_from_left(self.input.right, range_m) + self.curve.tangent(along) * self.slope
     }
 
-    /// The window about a pixel, resampled through `map`; `None` where part of it lies outside the image.
+    /// The window about a pixel, resampled through `map`; `None` if part of it is outside the image.
     fn window(&self, centre: Pixel, map: &Matrix2<f64>) -> Option<Patch> {
         let (image, half) = (self.input.right_image, self.half());
         let corner = map.abs() * Vector2::repeat(f64::from(half));
         let last = [f64::from(image.width()) - 1.0, f64::from(image.height()) - 1.0];
-        // The farthest corner in x and in y; a window that shows more than rounding beyond the image has a hole.
+        // The farthest corner in x and in y; a window that exceeds the image by more than rounding is incomplete.
         let inside = |v: f64, reach: f64, last: f64| v - reach >= -1e-9 && v + reach <= last + 1e-9;
         if !inside(centre.x, corner.x, last[0]) || !inside(centre.y, corner.y, last[1]) {
             return None;
@@ -120,8 +120,8 @@ impl Windows<'_> {
         (points, candidates.refine(self.settings.sub_pixel))
     }
 
-    /// Where the best position in focus is: the scores of the strip lead to it, and where there is no focus those of
-    /// the definition. The score is that of the search.
+    /// The best position in focus, starting from the scores of the strip, or without a focus from those of the
+    /// definition. The score is that of the search.
     pub(super) fn place(&self, interval: (f64, f64)) -> Option<Best> {
         let mut candidates = self.compared(interval);
         if self.template.focus.is_even() || candidates.highest().is_none() {
@@ -130,7 +130,7 @@ impl Windows<'_> {
         Some(self.in_focus(interval, candidates.refine(self.settings.sub_pixel)?))
     }
 
-    /// Windows about a pixel apart along the interval and across it, compared in strips where that can be done.
+    /// Windows about a pixel apart along the interval and across it, compared in strips where possible.
     fn compared(&self, interval: (f64, f64)) -> Candidates {
         let mut candidates = Candidates::new(interval, self.tolerance_px);
         let mut stretches = vec![(0, candidates.columns - 1)];
@@ -150,7 +150,7 @@ impl Windows<'_> {
         difference.amax() * f64::from(self.half()) <= SHARED_MAP_PX
     }
 
-    /// Scores columns `first` to `last` in one strip, where the strip's grid is near that of the windows.
+    /// Scores columns `first` to `last` in one strip, if the strip's grid is close to that of the windows.
     fn score_strip(&self, candidates: &mut Candidates, first: usize, last: usize) {
         let middle = candidates.along(usize::midpoint(first, last));
         let tangent = self.curve.tangent(middle);
@@ -197,7 +197,7 @@ impl Windows<'_> {
         })
     }
 
-    /// Compares by the definition what decides: the best candidates, their neighbours, and those without a score.
+    /// Compares by the definition the candidates that decide: the best, their neighbours, and those without a score.
     fn settle(&self, candidates: &mut Candidates) {
         let mut undecided: Vec<usize> =
             (0..candidates.scores.len()).filter(|index| candidates.scores[*index].is_nan()).collect();
@@ -220,8 +220,8 @@ impl Windows<'_> {
         }
     }
 
-    /// The best position moved to the next maximum in focus, where there is one inside the interval and the
-    /// tolerance; its score stays that of the whole window.
+    /// Moves the best position to the next maximum in focus, if there is one inside the interval and the tolerance;
+    /// keeps the score of the whole window.
     pub(super) fn in_focus(&self, (from, to): (f64, f64), best: Best) -> Best {
         let focus = self.template.focus;
         if focus.is_even() || best.at_end {
@@ -230,7 +230,7 @@ impl Windows<'_> {
         let (centre, _) = self.curve.at(best.along, best.across);
         let (map, tangent) = (self.right_from_left(best.along), self.curve.tangent(best.along));
         let (image, half, kernel) = (self.input.right_image, self.half(), self.settings.kernel);
-        // On a slope A stretches its own grid, on which a fit would see the peak narrower or wider.
+        // On a slope A stretches its own grid, on which the peak would appear narrower or wider to a fit.
         let is_facing = self.slope == RowVector2::zeros();
         let step = if is_facing { map } else { Matrix2::new(tangent.x, -tangent.y, tangent.y, tangent.x) };
         let place = |offset: Vector2<f64>| {
@@ -252,7 +252,7 @@ impl Windows<'_> {
         };
         let found = focus.climb(&self.template.patch, self.settings.sub_pixel, window_at);
         let Some((along, across)) = found.map(|found| place(found.offset_px)) else { return best };
-        // The same half pixel more that the fit of the whole window may take.
+        // Half a pixel beyond the tolerance, as in the fit of the whole window.
         if across.abs() > self.tolerance_px + 0.5 {
             return best;
         }
@@ -260,7 +260,7 @@ impl Windows<'_> {
     }
 }
 
-/// The square of side `size` at (`left`, `top`), which lies inside.
+/// The square of side `size` at (`left`, `top`), which must be inside the image.
 fn slice(image: &GrayImage, left: i32, top: i32, size: u32) -> Patch {
     let (left, top, side) = (left as usize, top as usize, size as usize);
     let mut values = Vec::with_capacity(side * side);
@@ -275,7 +275,7 @@ struct Candidates {
     from: f64,
     spacing: f64,
     columns: usize,
-    /// Those within the tolerance and one more to either side, so that the fit across has neighbours.
+    /// Rows within the tolerance and one more to either side, so that the fit across the curve has neighbours.
     rows: usize,
     scores: Vec<f32>,
     is_settled: Vec<bool>,
@@ -314,7 +314,7 @@ impl Candidates {
         inside.iter().copied().filter(|score| !score.is_nan()).reduce(f32::max)
     }
 
-    /// Index and score of the best within the tolerance, the first among equals.
+    /// Index and score of the best candidate within the tolerance, the first among equals.
     fn highest(&self) -> Option<(usize, f32)> {
         let valid = self.scores.iter().copied().enumerate();
         valid.filter(|(index, score)| self.is_inside(*index) && score.is_finite()).fold(
@@ -325,7 +325,7 @@ impl Candidates {
         )
     }
 
-    /// What must still be compared by the definition.
+    /// The candidates that must still be compared by the definition.
     fn undecided(&self) -> Vec<usize> {
         let Some((best, highest)) = self.highest() else { return Vec::new() };
         let (column, row) = (best / self.rows, best % self.rows);
@@ -342,20 +342,20 @@ impl Candidates {
     fn refine(&self, sub_pixel: bool) -> Option<Best> {
         let (index, score) = self.highest()?;
         let (column, row) = (index / self.rows, index % self.rows);
-        // Beyond a window that reaches out of the image a better one may lie, too.
+        // Next to a window that reaches out of the image, a better match may be outside.
         let is_cut = |column: usize| self.scores[column * self.rows + row].is_nan();
         let at_end = column == 0 || column + 1 == self.columns || is_cut(column - 1) || is_cut(column + 1);
         let mut best =
             Best { along: self.along(column), across: self.across(row), score: f64::from(score), at_end };
         if sub_pixel && !at_end {
-            // Rows of the fit lie across the curve, columns along it.
+            // Rows of the fit are across the curve, columns along it.
             let neighbours = Matrix3::from_fn(|dy, dx| {
                 f64::from(self.scores[(column + dx - 1) * self.rows + row + dy - 1])
             });
             if let Some(fit) = Fit::quadratic(&neighbours) {
                 best.along += fit.offset.x * self.spacing;
                 best.across += fit.offset.y;
-                // The fit may rise above the highest score of a correlation.
+                // The fit may exceed 1, the highest score of a correlation.
                 best.score = fit.score.min(1.0);
             }
         }

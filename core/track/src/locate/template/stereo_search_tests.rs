@@ -1,4 +1,4 @@
-//! The quick search against the definition, on rock-like planes before the navcams of Spirit.
+//! The fast search against the definition, on rock-like planes in front of Spirit's navcams.
 
 use image::Luma;
 use nalgebra::Matrix3x2;
@@ -45,11 +45,11 @@ fn navcams() -> [Camera; 2] {
     ]
 }
 
-/// A plane through a point, painted with detail of all sizes down to what a lens leaves.
+/// A plane through a point, textured at all scales that a lens resolves.
 struct Plane {
     point: Point3,
     normal: Vector3,
-    /// The longest wave, m.
+    /// The longest wavelength, m.
     wave_m: f64,
     seed: u32,
 }
@@ -85,7 +85,7 @@ impl Plane {
         0.5 + octaves.sum::<f64>()
     }
 
-    /// The picture around a pixel, 75 px to either side along the rows and 40 px across; grey beyond.
+    /// The image around a pixel, 75 px to either side along the rows and 40 px across; grey beyond.
     fn picture(&self, camera: &Camera, around: Pixel, noise: f64, random: &mut Pcg64Mcg) -> GrayImage {
         let mut image = GrayImage::from_pixel(1024, 1024, Luma([0.5]));
         let (x, y) = (around.x as u32, around.y as u32);
@@ -104,7 +104,7 @@ struct Scene {
     left_pixel: Pixel,
     true_right: Pixel,
     range_m: f64,
-    /// How the point of the plane moves with the left pixel, m per px.
+    /// Derivative of the plane's point with respect to the left pixel, m per px.
     surface_by_pixel: Matrix3x2<f64>,
 }
 
@@ -120,7 +120,7 @@ impl Scene {
         let tilt = between(0.0, 60_f64.to_radians());
         let across = aside.cross(&ray.direction).normalize();
         let normal = -ray.direction * tilt.cos() + across * tilt.sin();
-        // 96 px, which leaves 6 px to the finest octave and 3 px where it is foreshortened most.
+        // 96 px, so that the finest octave has 6 px, and 3 px where it is foreshortened most.
         let plane = Plane { point, normal, wave_m: 96.0 * range_m / 1210.0, seed: seed as u32 };
         let true_right = cameras[1].project(&point).unwrap();
         let met = |dx: f64, dy: f64| {
@@ -178,7 +178,7 @@ fn the_quick_search_finds_what_the_definition_finds() {
         );
     }
     println!("{apart} of 200 apart, the farthest by {farthest:.4} px");
-    // Facing and sloped windows sometimes score alike within rounding; then either may stand.
+    // Facing and sloped windows sometimes have equal scores within rounding; then either may win.
     assert!(apart <= 4 && farthest < 0.02, "{apart} apart, the farthest by {farthest} px");
 }
 
@@ -194,7 +194,7 @@ fn the_right_pixel_lies_at_the_truth_and_leads_back_to_the_left_one() {
 
 #[test]
 fn without_a_slope_from_the_neighbours_that_of_an_earlier_stop_serves() {
-    // No two neighbours are as exactly opposite as this asks.
+    // No two neighbours are exactly opposite.
     let settings = TemplateSettings { slope_bend_px: 0.0, ..TemplateSettings::default() };
     let (mut facing_misses, mut carried_misses, mut count) = (0.0, 0.0, 0);
     for seed in 4000..4030 {
@@ -204,7 +204,7 @@ fn without_a_slope_from_the_neighbours_that_of_an_earlier_stop_serves() {
         let [facing, found] = [input, carried].map(|input| point_stereo(&input, &settings).unwrap());
         assert!(found.score >= facing.score, "seed {seed}");
         assert!(found.right_pixel.distance(scene.true_right) < 0.2, "seed {seed}");
-        // A carried slope is used for the error only where its windows score higher.
+        // A carried slope is used for the error only if its windows score higher.
         let slope = (found.right_from_left - facing.right_from_left).amax();
         assert_eq!(slope > 0.0, found.score > facing.score, "seed {seed}: {slope}");
         (facing_misses, carried_misses) =
@@ -219,7 +219,7 @@ fn without_a_slope_from_the_neighbours_that_of_an_earlier_stop_serves() {
 fn a_match_of_something_else_does_not_lead_back() {
     for seed in 3000..3010 {
         let (mut scene, other) = (Scene::new(seed, 5.0), Scene::new(seed + 500, 5.0));
-        // The right eye sees another rock at the target's place.
+        // The right camera sees another rock at the target's position.
         let (x, y) = (other.true_right.x as u32, other.true_right.y as u32);
         let (to_x, to_y) = (scene.true_right.x as u32, scene.true_right.y as u32);
         for (v, u) in (0..80).flat_map(|v| (0..150).map(move |u| (v, u))) {
@@ -231,7 +231,7 @@ fn a_match_of_something_else_does_not_lead_back() {
     }
 }
 
-/// R75: 80 px of disparity from zero end at about 3.05 m, where flight runs came to 1.92 m.
+/// R75: 80 px of disparity from zero end at about 3.05 m, whereas flight runs reached 1.92 m.
 #[test]
 fn disparities_counted_from_zero_exclude_targets_nearer_than_three_metres() {
     let literal =

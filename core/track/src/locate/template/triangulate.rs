@@ -1,14 +1,14 @@
 //! Step `triangulate`: the position from both pixels, with its covariance (K§4.4, R77; domain.md 3.1, 13.4).
 //!
-//! The position is the midpoint of the two unrectified rays; the ray gap is reported. The covariance is
-//! propagated by the unscented transform of (u_l, v_l, u_r, v_r). With D the covariance of the left position,
-//! M = ∂right/∂left on the surface and S that of the right position for a given left one, an error of the left
-//! position moves both eyes along the surface:
+//! The position is the midpoint of the two unrectified rays; the ray gap is reported. The covariance is propagated by
+//! the unscented transform of (u_l, v_l, u_r, v_r). With D the covariance of the left position, M = ∂right/∂left on
+//! the surface and S the covariance of the right position for a given left one, an error of the left position
+//! displaces both pixels along the surface:
 //! ```text
 //! P = [ D     D Mᵀ        ]
 //!     [ M D   M D Mᵀ + S  ]
 //! ```
-//! The preset `half_pixel` is the papers': independent half pixels in both eyes, `P = I/4` (R172).
+//! The preset `half_pixel` is the papers': independent half pixels in both cameras, `P = I/4` (R172).
 
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Matrix4, Vector2, Vector4};
 use serde::{Deserialize, Serialize};
@@ -22,7 +22,7 @@ use sightline_geometry::estimate::unscented::{UnscentedParameters, unscented};
 use sightline_geometry::frames::{Pixel, Point3};
 use sightline_record::{Declaration, Record, Unit};
 
-/// The papers' noise: half a pixel (1σ) in each coordinate of each eye (R172), px².
+/// The papers' noise: half a pixel (1σ) in each coordinate of each camera (R172), px².
 pub(super) const HALF_PIXEL_VARIANCE: f64 = 0.25;
 
 /// The position from both pixels.
@@ -34,21 +34,21 @@ pub struct Triangulation {
     /// Its covariance, m².
     #[schema(value_type = Vec<f64>)]
     pub covariance_in_rover: Matrix3<f64>,
-    /// How the surface point moves with the left pixel, m per px: its two tangents, column by column.
+    /// Derivative of the surface point with respect to the left pixel, m per px: its two tangents, column by column.
     #[schema(value_type = Option<Vec<f64>>)]
     pub surface_by_pixel: Option<Matrix3x2<f64>>,
     /// Distance from the left camera, m.
     pub range_m: f64,
-    /// How far the two rays miss each other, m.
+    /// Distance between the two rays, m.
     pub gap_m: f64,
-    /// The same at the target's distance, px.
+    /// Distance between the two rays at the target's distance, px.
     pub gap_px: f64,
 }
 
 /// Triangulates and propagates the noise of both pixels.
 ///
 /// # Errors
-/// A sentence when the rays do not meet in front of the cameras.
+/// If the rays do not meet in front of the cameras.
 pub fn triangulate(
     input: &StereoInput<'_>,
     stereo: &PointStereo,

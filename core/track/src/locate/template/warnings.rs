@@ -1,4 +1,4 @@
-//! Warnings for a badly picked target (R21): what tracks badly can be seen at the designation.
+//! Warnings for an unsuitable target (R21): causes of bad tracking that are visible at the designation.
 //!
 //! | warning | measured | limit |
 //! |---|---|---|
@@ -6,17 +6,17 @@
 //! | `depth_range` | (farthest − nearest) / distance in the window | ≤ `warn_depth_range` |
 //! | `occluding_boundary` | largest departure from a plane / distance | ≤ `warn_boundary` |
 //! | `weak_stereo` | score of point stereo | ≥ `stereo_ncc_min` |
-//! | `left_right` | way from the left pixel to the right one and back | ≤ `warn_left_right_px` |
-//! | `shadow` | share of the window in shadow, where the simulator knows the light | ≤ `warn_shadow_share` |
+//! | `left_right` | distance between the left pixel and the match of its right pixel in the left image | ≤ `warn_left_right_px` |
+//! | `shadow` | share of the window in shadow, if the simulator provides the light | ≤ `warn_shadow_share` |
 //!
-//! Ranges are those of the target and of eight neighbours in the window (`relief`). Where fewer than five remain nothing is
-//! said of them. A plane in space has an inverse range that is linear over the image,
+//! The ranges are those of the target and of eight neighbours in the window (`relief`). With fewer than five ranges
+//! there is no warning about them. A plane in space has an inverse range that is linear over the image,
 //! ```text
 //! 1/R ≈ a + b u + c v
 //! ```
-//! and fills the window to its corners: the depth range is that of the plane over the whole window, or of the points
-//! where that is more. What the fit leaves over is free of the slope of the surface: it is relief, and where two
-//! surfaces meet in the window a step, of which it keeps a third.
+//! and extends to the corners of the window: the depth range is that of the plane over the whole window, or of the
+//! points if that is larger. The residuals of the fit are independent of the slope of the surface: they measure
+//! relief, and a third of the step where two surfaces meet in the window.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -34,41 +34,41 @@ use crate::limits::Limits;
 use crate::settings::Settings;
 use sightline_vision::image::patch;
 
-/// Points below which nothing is said of the ranges: a plane takes three.
+/// Smallest number of ranges for a warning about them; a plane takes three.
 const POINTS_MIN: usize = 5;
 
-/// What is wrong with a target.
+/// The problem of a target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum WarningKind {
     /// The window has little texture.
     LowContrast,
-    /// The window holds very different ranges.
+    /// The ranges in the window differ widely.
     DepthRange,
     /// Two surfaces meet in the window.
     OccludingBoundary,
-    /// Much of the window lies in shadow.
+    /// Much of the window is in shadow.
     Shadow,
-    /// Point stereo found nothing alike, so that the range may be any.
+    /// Point stereo found no similar window, so that the range may be wrong.
     WeakStereo,
-    /// The match of point stereo does not lead back to the pixel, so that the range may be any.
+    /// The match of point stereo fails the left–right check, so that the range may be wrong.
     LeftRight,
 }
 
 /// One warning.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Warning {
-    /// What is wrong.
+    /// The problem.
     pub kind: WarningKind,
     /// The measured value: px for `left_right`, a fraction for the others.
     pub value: f64,
-    /// The limit it exceeds, or falls below.
+    /// The limit that the value exceeds or falls below.
     pub limit: f64,
-    /// The same as a sentence for the person who picked the target.
+    /// The warning as a sentence for the user who designated the target.
     pub sentence: String,
 }
 
-/// Looks at the window of a designated target at `range_m`, which this stereo match gave.
+/// Checks the window of a designated target at `range_m`, the range of this stereo match.
 pub(super) fn look(
     input: &StereoInput<'_>,
     range_m: f64,
@@ -124,7 +124,7 @@ fn of_stereo(stereo: &PointStereo, limits: &Limits) -> Vec<Warning> {
     found
 }
 
-/// The warning for a window of which `share` lies in shadow.
+/// The warning for a window with `share` of it in shadow.
 pub fn of_shadow(share: f64, limits: &Limits) -> Option<Warning> {
     (share > limits.warn_shadow_share).then(|| Warning {
         kind: WarningKind::Shadow,
@@ -140,9 +140,9 @@ pub fn of_shadow(share: f64, limits: &Limits) -> Option<Warning> {
 /// A range at an offset from the target.
 #[derive(Clone, Copy, Debug)]
 pub struct Ranged {
-    /// To the right, px.
+    /// Offset to the right, px.
     pub u_px: f64,
-    /// Downwards, px.
+    /// Offset downwards, px.
     pub v_px: f64,
     /// Range along the left ray, m.
     pub range_m: f64,
@@ -153,7 +153,7 @@ fn of_ranges(ranges: &[Ranged], distance_m: f64, half_px: f64, limits: &Limits) 
     let Some(plane) = plane(ranges) else { return found };
     let reach = half_px * (plane[1].abs() + plane[2].abs());
     let nearest = ranges.iter().map(|r| r.range_m).fold(1.0 / (plane[0] + reach), f64::min);
-    // A plane seen so grazingly that it leaves the window at infinity is as far as the points are.
+    // A plane that reaches infinity inside the window counts only as far as the points.
     let corner_m = Some(1.0 / (plane[0] - reach)).filter(|r| *r > 0.0).unwrap_or(0.0);
     let farthest = ranges.iter().map(|r| r.range_m).fold(corner_m, f64::max);
     let spread = (farthest - nearest) / distance_m;
@@ -190,7 +190,7 @@ fn row(r: &Ranged) -> Vector3<f64> {
     Vector3::new(1.0, r.u_px, r.v_px)
 }
 
-/// The plane through the ranges: a, b and c of the inverse range.
+/// Fits a plane to the ranges: a, b and c of the inverse range.
 pub fn plane(ranges: &[Ranged]) -> Option<Vector3<f64>> {
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
     for point in ranges {
@@ -200,7 +200,7 @@ pub fn plane(ranges: &[Ranged]) -> Option<Vector3<f64>> {
     Some(normal.try_inverse()? * right)
 }
 
-/// The largest residual of a plane, as a share of the distance.
+/// The largest residual of the inverse range from a plane, times the distance.
 pub fn departure(plane: &Vector3<f64>, ranges: &[Ranged], distance_m: f64) -> f64 {
     let residual = |r: &Ranged| (1.0 / r.range_m - plane.dot(&row(r))).abs() * distance_m;
     ranges.iter().map(residual).fold(0.0, f64::max)
@@ -220,7 +220,7 @@ fn ranges(input: &StereoInput<'_>, range_m: f64, settings: &TemplateSettings) ->
 mod tests {
     use super::*;
 
-    /// Nine ranges: `range(u, v)`.
+    /// Nine ranges, `range_m(u, v)`.
     fn grid(range_m: impl Fn(f64, f64) -> f64) -> Vec<Ranged> {
         let offsets = [-10.0, 0.0, 10.0];
         offsets

@@ -1,19 +1,19 @@
-//! How the pixels of a prepared template lie in the image from which it was taken.
+//! Maps the pixels of a prepared template to the image from which it was taken.
 //!
-//! To first order a linear map about the target's pixel serves (`scale_roll`). Beyond it the surface is taken as a plane,
-//! and each pixel of the new window is followed through both camera models:
+//! To first order this is a linear map about the target's pixel (`scale_roll`). Beyond it the surface is taken as a
+//! plane, and each pixel of the new window is mapped through both camera models:
 //! ```text
-//! pixel_new → ray → point on the plane (p, n), present rover frame → rover frame of the template → pixel_old
-//! n = t_u × t_v        t: the surface's two tangents ∂p/∂pixel_old, rotated into the present frame
+//! pixel_new → ray → point on the plane (p, n), current rover frame → rover frame of the template → pixel_old
+//! n = t_u × t_v        t: the surface's two tangents ∂p/∂pixel_old, rotated into the current frame
 //! ```
-//! For two linear cameras this is the plane's homography (Hartley & Zisserman 2004, 13.1); with CAHVOR(E) it holds their
-//! distortion too. The target's own pixel maps to itself exactly: what the two rays of its triangulation missed each
-//! other by is added as a shift.
+//! For two linear cameras this is the plane's homography (Hartley & Zisserman 2004, 13.1); with CAHVOR(E) it includes
+//! their distortion. A shift by the ray gap of the target's triangulation is added, so that the target's own pixel
+//! maps to itself exactly.
 //!
 //! | symbol | name | unit, frame |
 //! |---|---|---|
-//! | p | `point_now` | m, present rover frame |
-//! | n | `normal_now` | –, present rover frame |
+//! | p | `point_now` | m, current rover frame |
+//! | n | `normal_now` | –, current rover frame |
 
 use nalgebra::{Matrix2, Vector2};
 
@@ -26,20 +26,20 @@ use sightline_vision::image::sample::Kernel;
 /// The map from the image of the template to the prepared window.
 #[derive(Clone, Debug)]
 pub(super) enum WindowMap<'a> {
-    /// Of first order, px per px.
+    /// First order, px per px.
     Linear(Matrix2<f64>),
     /// Through a plane.
     Plane(Box<PlaneMap<'a>>),
 }
 
-/// An appearance and how it is seen now.
+/// An appearance and its map to the current view.
 #[derive(Clone, Debug)]
 pub(super) struct WindowSource<'a> {
-    /// Where the pixels come from.
+    /// The source of the pixels.
     pub(super) appearance: &'a Appearance,
-    /// How they are moved.
+    /// The map of the pixels.
     pub(super) map: WindowMap<'a>,
-    /// How they are read.
+    /// The interpolation of the pixels.
     pub(super) kernel: Kernel,
 }
 
@@ -65,14 +65,14 @@ pub(super) struct PlaneMap<'a> {
     point_now: Point3,
     normal_now: Vector3,
     pixel_now: Pixel,
-    /// From where the old camera sees the target to where it was picked, px.
+    /// Offset from the projection of the target in the old image to its pixel there, px.
     shift: Vector2<f64>,
     /// Magnification at the target.
     scale: f64,
 }
 
 impl<'a> PlaneMap<'a> {
-    /// `None` where the surface is not known, or either camera does not see the target.
+    /// `None` if the surface is unknown, or the target is not visible to either camera.
     pub(super) fn new(
         appearance: &'a Appearance,
         now_from_template: &Pose,
@@ -96,7 +96,7 @@ impl<'a> PlaneMap<'a> {
         })
     }
 
-    /// The pixel of the old image that the new window shows at an offset from its middle.
+    /// The pixel of the old image at an offset from the middle of the new window.
     pub(super) fn source_of(&self, offset: Vector2<f64>) -> Option<Pixel> {
         let ray = self.now.ray(self.pixel_now.offset(offset.x, offset.y))?;
         let distance_m =

@@ -1,4 +1,4 @@
-//! A block of one product: a few rows of vectors that stay in the registers while the filter passes.
+//! A block of one product: a few rows of vectors that stay in registers during the pass of the filter.
 
 use pulp::{Simd, WithSimd};
 
@@ -11,21 +11,21 @@ pub(super) struct Block<'a, const A: usize, const V: usize> {
     pub(super) filter: &'a [[f32; MAX_SIDE + 1]],
     /// Columns of the filter.
     pub(super) taps: usize,
-    /// T from the block's first row and column.
+    /// T, starting at the block's first row and column.
     pub(super) plane: &'a [f32],
-    /// Numbers from one row of T to the next.
+    /// Length of a row of T.
     pub(super) stride: usize,
-    /// The products of all places from the block's first on.
+    /// The products of all places, starting at the block's first.
     pub(super) out: &'a mut [f32],
-    /// Which of the products this is, and places per row.
+    /// Index of the product, and places per row.
     pub(super) from: [usize; 2],
 }
 
 impl<const A: usize, const V: usize> WithSimd for Block<'_, A, V> {
     type Output = ();
 
-    /// Two rows of T at a time, A apart: the upper one serves the rows of sums down to its own, the lower one the
-    /// others.
+    /// Processes two rows of T at a time, A apart: the upper one contributes to the rows of sums down to its own, the
+    /// lower one to the others.
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let span = V * S::F32_LANES;

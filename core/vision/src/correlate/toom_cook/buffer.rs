@@ -1,19 +1,19 @@
-//! Numbers that begin at a cache line, so that no whole vector of theirs lies across two.
+//! Buffers aligned to cache lines, so that no whole vector crosses two lines.
 
 use std::ops::{Deref, DerefMut};
 
 use super::lanes::WIDEST;
 
-/// A cache line, which is as long as the widest vector.
+/// A cache line, as long as the widest vector.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C, align(64))]
 struct Line([f32; WIDEST]);
 
-/// A run of numbers, at first all 0, rounded up to whole lines.
+/// A zero-initialised run of `f32`, rounded up to whole lines.
 pub(in crate::correlate) struct Buffer(Vec<Line>);
 
 impl Buffer {
-    /// Room for `numbers` numbers.
+    /// Allocates at least `numbers` values.
     pub(in crate::correlate) fn new(numbers: usize) -> Self {
         Self(vec![Line([0.0; WIDEST]); numbers.div_ceil(WIDEST)])
     }

@@ -1,8 +1,8 @@
-//! One score in two passes (K-Eq 11, R62, R66): the definition, written out.
+//! Single scores in two passes (K-Eq 11, R62, R66): the definition as written.
 //!
-//! [`Template`] serves single scores, in double precision; its sums run over columns first, side by side, in an order
-//! that never changes. [`Alone`] serves the positions of a surface where the sums of a whole tile lose too many digits:
-//! about the window's own mean the differences are exact in `f32`, and their sums good to 1e-7.
+//! [`Template`] computes single scores in double precision; its sums run over columns first, side by side, in a fixed
+//! order. [`Alone`] computes the positions of a score map for which the sums of a whole tile lose too many digits: about
+//! the window's own mean the differences are exact in `f32`, and their sums are accurate to 1e-7.
 
 use pulp::{Simd, WithSimd};
 
@@ -10,7 +10,7 @@ use crate::image::patch::{FLAT_STD, Patch};
 
 /// A template with zero mean and unit norm: `t = (I − Ī) / sqrt(Σ(I − Ī)²)`.
 pub(in crate::correlate) struct Template {
-    /// Columns.
+    /// Number of columns.
     pub(in crate::correlate) width: usize,
     /// Row-major values; all zero for a template without contrast.
     pub(in crate::correlate) values: Vec<f64>,
@@ -19,7 +19,7 @@ pub(in crate::correlate) struct Template {
 }
 
 impl Template {
-    /// The template of a patch; `None` when it is empty or holds an invalid pixel.
+    /// Normalises a patch; `None` if it is empty or contains an invalid pixel.
     pub(in crate::correlate) fn new(patch: &Patch) -> Option<Self> {
         let pixels = patch.as_raw();
         let sum = sum_of(pixels, |v| v);
@@ -35,7 +35,7 @@ impl Template {
         Some(Self { width: patch.width() as usize, values, is_flat })
     }
 
-    /// The score of a window of the template's size, all of whose pixels are valid; `None` for one without contrast.
+    /// The score of a window of the template's size without invalid pixels; `None` if either has no contrast.
     pub(in crate::correlate) fn score(&self, pixels: &[f32]) -> Option<f64> {
         let rows = || pixels.chunks_exact(self.width);
         if self.is_flat || pixels.iter().all(|v| *v == pixels[0]) {
@@ -59,10 +59,10 @@ impl Template {
     }
 }
 
-/// Numbers that [`sum_of`] sums side by side.
+/// Number of partial sums in [`sum_of`].
 const LANES: usize = 8;
 
-/// The sum of what `term` makes of numbers, in an order that never changes.
+/// Sum of `term` over numbers, in a fixed order.
 #[inline(always)]
 pub(in crate::correlate) fn sum_of(numbers: &[f32], term: impl Fn(f64) -> f64) -> f64 {
     let (lanes, rest) = numbers.as_chunks::<LANES>();
@@ -75,25 +75,25 @@ pub(in crate::correlate) fn sum_of(numbers: &[f32], term: impl Fn(f64) -> f64) -
     sums.iter().sum::<f64>() + rest.iter().map(|v| term(f64::from(*v))).sum::<f64>()
 }
 
-/// A window of a surface by itself.
+/// A single window of a score map, to be scored in two passes.
 pub(in crate::correlate) struct Alone<'a> {
-    /// The template as rounded to `f32`, row-major; its side; sum and norm of it.
+    /// The template as rounded to `f32`, row-major; its side; its sum and norm.
     pub(in crate::correlate) template: &'a [f32],
     pub(in crate::correlate) size: usize,
     pub(in crate::correlate) sum: f32,
     pub(in crate::correlate) norm: f32,
-    /// Pixels from the window's first on, all those of the window valid.
+    /// Pixels starting at the window's first; those of the window are valid.
     pub(in crate::correlate) pixels: &'a [f32],
     /// Columns of the image.
     pub(in crate::correlate) stride: usize,
-    /// Takes the window: as many numbers as the template.
+    /// Buffer for the window, as long as the template.
     pub(in crate::correlate) window: &'a mut [f32],
 }
 
 impl WithSimd for Alone<'_> {
     type Output = Option<f32>;
 
-    /// The score; `None` for a window without contrast.
+    /// Returns the score; `None` if the window has no contrast.
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Option<f32> {
         let Self { template, size, window, .. } = self;

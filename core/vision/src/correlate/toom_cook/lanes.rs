@@ -1,17 +1,17 @@
-//! Slices of numbers as the processor's vectors.
+//! Slices of `f32` as the processor's vectors.
 
 use pulp::Simd;
 
-/// Numbers of the widest vector of any processor.
+/// Lanes of the widest vector of any processor.
 pub(in crate::correlate) const WIDEST: usize = 16;
 
-/// The `count` vectors from `start` on.
+/// Returns `count` vectors starting at `start`.
 #[inline(always)]
 pub(in crate::correlate) fn row_of<S: Simd>(values: &[f32], start: usize, count: usize) -> &[S::f32s] {
     &S::as_simd_f32s(&values[start..start + count * S::F32_LANES]).0[..count]
 }
 
-/// The `count` vectors from `start` on.
+/// Returns `count` mutable vectors starting at `start`.
 #[inline(always)]
 pub(in crate::correlate) fn row_of_mut<S: Simd>(
     values: &mut [f32],
@@ -21,14 +21,14 @@ pub(in crate::correlate) fn row_of_mut<S: Simd>(
     &mut S::as_mut_simd_f32s(&mut values[start..start + count * S::F32_LANES]).0[..count]
 }
 
-/// Vectors per row of a block: as many as the registers hold beside the operands.
+/// Vectors per row of a block: as many as fit into the registers beside the operands.
 #[inline(always)]
 pub(in crate::correlate) const fn widest<S: Simd>() -> usize {
     if S::REGISTER_COUNT >= 32 { 3 } else { 1 }
 }
 
-/// Repeats a block of code for the numbers that follow, each as a constant: what the sums are indexed by must be known
-/// before anything else for them to stay in registers.
+/// Repeats a block of code with each number as a constant: the indices of sums must be compile-time constants for them
+/// to stay in registers.
 macro_rules! for_each {
     ($name:ident in [$($number:literal)*] $body:block) => {
         $({ const $name: usize = $number; $body })*

@@ -1,4 +1,4 @@
-//! Brings the pixels of a tile near: less about their mean, which costs no digits, and in phases.
+//! Copies the pixels of a tile: minus their approximate mean, which preserves digits, and in phases.
 
 use pulp::{Simd, WithSimd};
 
@@ -6,30 +6,30 @@ use super::lanes::{WIDEST, row_of, row_of_mut};
 use super::phases::Part;
 use super::tile::{PHASES, Tile};
 
-/// Samples along each side of a tile from which its mean is guessed.
+/// Samples along each side of a tile from which its mean is estimated.
 const SAMPLES: usize = 5;
 
-/// Copies some rows of a tile's pixels; only `CHECKED` looks whether a pixel is valid.
+/// Copies some rows of a tile's pixels; only with `CHECKED` are invalid pixels replaced.
 pub(in crate::correlate) struct Load<'a, const CHECKED: bool> {
-    /// Pixels of the image, from the tile's first on.
+    /// Pixels of the image, starting at the tile's first.
     pub(in crate::correlate) pixels: &'a [f32],
     /// Columns of the image.
     pub(in crate::correlate) pitch: usize,
-    /// Rows and columns of the tile's pixels.
+    /// Rows and columns of pixels in the tile.
     pub(in crate::correlate) size: [usize; 2],
     pub(in crate::correlate) tile: Tile,
-    /// What the pixels are taken less.
+    /// Value subtracted from the pixels.
     pub(in crate::correlate) mean: f32,
-    /// The first row to copy, and one beyond the last.
+    /// The first row to copy, and one past the last.
     pub(in crate::correlate) rows: [usize; 2],
-    /// Takes a row.
+    /// Buffer for a row.
     pub(in crate::correlate) row: &'a mut [f32],
-    /// Takes the pixels, in phases; what the tile does not fill becomes 0, and so do invalid pixels.
+    /// Receives the pixels, in phases; padding and invalid pixels are 0.
     pub(in crate::correlate) input: &'a mut [f32],
 }
 
 impl<const CHECKED: bool> WithSimd for Load<'_, CHECKED> {
-    /// The sum of all that was copied: an invalid pixel makes it invalid as well.
+    /// Sum of the copied pixels, not finite if any of them is invalid.
     type Output = f32;
 
     #[inline(always)]
@@ -77,7 +77,7 @@ impl<const CHECKED: bool> WithSimd for Load<'_, CHECKED> {
     }
 }
 
-/// The mean of some of `height` × `width` pixels, spread evenly: any value nearby serves.
+/// Approximate mean of `height` × `width` pixels from evenly spaced samples; a rough value suffices.
 #[inline(always)]
 pub(in crate::correlate) fn rough_mean(pixels: &[f32], pitch: usize, [height, width]: [usize; 2]) -> f32 {
     let (mut sum, mut count) = (0.0, 0.0);

@@ -1,32 +1,32 @@
 //! The numerators of K-Eq 11, `Σ t(u, v) · j(x + u, y + v)`, with 5/18 of the multiplications: Toom–Cook filtering
 //! along the rows and along the columns (Winograd 1980; Lavin and Gray 2016 for F(4, 3) and F(3, 3)).
 //!
-//! **Columns.** Three columns of sums side by side are products of polynomials, which five values determine:
+//! **Columns.** Three adjacent columns of sums are products of polynomials, which five values determine:
 //! ```text
 //! d_k = column 3X + k of the image, k < 5     h_k = column 3X + k of the template, k < 3     (points 0, 1, −1, −2, ∞)
 //! U3 = d3 − d1     U1 = U3 + 3 (d1 + d2)      U2 = U3 + (d2 − d1)      U0 = U3 + 2 (d2 − d0)     U4 = 2 U3 + (d4 − d2)
 //! H0 = −h0/2       H1 = (h0 + h1 + h2)/6      H2 = (h0 − h1 + h2)/2    H3 = −(h0 − 2 h1 + 4 h2)/6          H4 = h2
 //! m0 = P0 + P1 + P2 + P3                      m1 = P1 − P2 − 2 P3      m2 = P1 + P2 + 4 P3 + P4
 //! ```
-//! **Rows.** The same for four rows of sums, D rows apart, in each U and H; the rows of a template are read as three
-//! taps, D rows apart as well, v = a + D·k, a < D, k < 3. Six values determine them:
+//! **Rows.** The same for four rows of sums, D rows apart, in each U and H; the rows of a template are three taps, also
+//! D rows apart, v = a + D·k, a < D, k < 3. Six values determine them:
 //! ```text
 //! u_k = row a + D·k of U, k < 6               h_k = row a + D·k of H, k < 3                   α² = 1/2, γ² = 2
-//! T0 = u0 − 5/2 u2 + u4       T5 = T0 of the row D below     (the points 0, ±α, ±γ and ∞)
+//! T0 = u0 − 5/2 u2 + u4       T5 = T0, D rows below           (the points 0, ±α, ±γ and ∞)
 //! T1, T2 = (u4 − 2 u2) ± α (u3 − 2 u1)                       T3, T4 = (u4 − u2/2) ± γ (u3 − u1/2)
 //! G0 = h0      G1, G2 = −(h0 ± α h1 + h2/2) / 3/2            G3, G4 = (h0 ± γ h1 + 2 h2) / 6      G5 = h2
 //! y0 = M0 + (M1 + M2) + (M3 + M4)                            y1 = α (M1 − M2) + γ (M3 − M4)
 //! y2 = (M1 + M2)/2 + 2 (M3 + M4)                             y3 = α³ (M1 − M2) + γ³ (M3 − M4) + M5
 //! ```
-//! What is left are thirty plain correlations Σ_a G(a) ∗ T(a), each of D rows and a third of the columns. D rows of
-//! sums times `V` vectors stay in the registers while the template passes: one loaded piece of T serves up to D
-//! multiply-adds, one value of G serves V. One plane of U, and what is made of it, stays in the nearest cache.
+//! The remainder is thirty plain correlations Σ_a G(a) ∗ T(a), each of D rows and a third of the columns. D rows of sums
+//! times `V` vectors stay in registers during the pass of the template: one loaded vector of T serves up to D
+//! multiply-adds, one value of G serves V. One plane of U, and the values computed from it, stay in the L1 cache.
 //!
-//! **Work.** For 12 · D rows and columns of sums 30 multiplications instead of 108: 5/18 · n² a sum where n = 3 D.
+//! **Work.** For 12 · D rows and columns of sums 30 multiplications instead of 108: 5/18 · n² per sum with n = 3 D.
 //!
 //! **Digits.** The error is that of plain `f32` sums, since each sum has fewer terms (on smooth noise 4.1e-8 of the
-//! tile's root mean square, plain sums 4.4e-8). But it goes with the brightness of the whole tile, not of the window
-//! alone: see `zncc`.
+//! tile's root mean square, plain sums 4.4e-8). But it is proportional to the brightness of the whole tile, not of the
+//! window alone: see `zncc`.
 //!
 //! | symbol | name | unit |
 //! |---|---|---|
@@ -57,15 +57,15 @@ use tile::{PHASES, TILE_COLUMNS, Tile};
 
 /// A template as the thirty filters G, in the order in which a block reads them.
 pub(super) struct Filters {
-    /// Columns of the template.
+    /// Side of the template, px.
     size: usize,
-    /// Rows of sums in a block, and rows of G that it takes at once.
+    /// Rows of sums in a block, and rows of G that it processes at once.
     side: usize,
-    /// How many times `side` the dilation is.
+    /// Dilation divided by `side`.
     chunks: usize,
     /// `[product][chunk][column][row of the chunk]`.
     values: Vec<[f32; MAX_SIDE + 1]>,
-    /// H for rows of sums that are too few for all this: `[chunk][column][point][row of the chunk]`.
+    /// H for groups with too few rows of sums: `[chunk][column][point][row of the chunk]`.
     rows: Vec<[[f32; MAX_SIDE + 1]; COLUMN_POINTS]>,
 }
 
@@ -86,12 +86,12 @@ impl Filters {
         self.side * self.chunks
     }
 
-    /// Rows of sums that [`Self::sum`] gives at once.
+    /// Rows of sums that [`Self::sum`] returns at once.
     pub(super) fn group_rows(&self) -> usize {
         4 * self.dilation()
     }
 
-    /// Rows of pixels that `groups` of them need.
+    /// Rows of pixels required by `groups` groups.
     pub(super) fn pixel_rows(&self, groups: usize) -> usize {
         groups * self.group_rows() + 3 * self.dilation()
     }
@@ -106,7 +106,7 @@ impl Filters {
         }
     }
 
-    /// Prepares some rows of a tile, the first and one beyond the last given, whose pixels are `input`.
+    /// Computes U for rows of a tile, from the first to one past the last, whose pixels are `input`.
     #[inline(always)]
     pub(super) fn begin<S: Simd>(
         &self,
@@ -119,7 +119,8 @@ impl Filters {
         simd.vectorize(ColumnValues { tile, input, rows, planes: &mut scratch.planes });
     }
 
-    /// The sums of `group_rows` rows of positions from row `top` of the tile on, whose pixels are taken less `level`.
+    /// Computes the sums of `group_rows` rows of positions, starting at row `top` of the tile, with `level` subtracted
+    /// from the pixels.
     #[inline(always)]
     pub(super) fn sum<S: Simd>(
         &self,
@@ -145,7 +146,7 @@ impl Filters {
         simd.vectorize(Join { spacing, products, output });
     }
 
-    /// The sums of some rows of positions, from the first to one before the last: each by itself, with 5/9 of the
+    /// Computes the sums of single rows of positions, from the first to one past the last, with 5/9 of the
     /// multiplications.
     #[inline(always)]
     pub(super) fn sum_rows<S: Simd>(
@@ -161,7 +162,7 @@ impl Filters {
         simd.vectorize(Rows { filter, size, side, tile, planes, level, rows, output });
     }
 
-    /// P of a point of the rows and one of the columns, whose values are `plane`.
+    /// Computes P of a point of the rows and one of the columns, with values `plane`.
     #[inline(always)]
     fn product<S: Simd>(
         &self,
@@ -214,7 +215,7 @@ impl Filters {
     }
 }
 
-/// Works out the filters.
+/// Computes the filters.
 struct Fill<'a> {
     template: &'a [f32],
     size: usize,
@@ -250,7 +251,7 @@ impl WithSimd for Fill<'_> {
 }
 
 impl Fill<'_> {
-    /// H for the three columns of a tap, with the rows of a chunk side by side; those of the template are kept.
+    /// H for the three columns of a tap, with the rows of a chunk side by side; also stored in `rows`.
     #[inline(always)]
     fn column_points(&mut self, chunk: usize, tap: usize) -> [Lanes; COLUMN_POINTS] {
         let mut taps = [Lanes::default(); PHASES];
@@ -275,13 +276,13 @@ impl Fill<'_> {
     }
 }
 
-/// Buffers of one tile, used again for the next.
+/// Buffers of one tile, reused for the next.
 pub(super) struct Scratch {
-    /// U of all points of the columns.
+    /// U at all points of the columns.
     planes: Buffer,
     /// T of one plane, at the points of the rows.
     values: [Buffer; ROW_POINTS - 1],
-    /// P: the vectors of all products at one place side by side.
+    /// P: the vectors of all products of one place are adjacent.
     products: Buffer,
 }
 

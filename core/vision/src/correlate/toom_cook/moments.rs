@@ -1,17 +1,17 @@
-//! Sum and sum of squares of every window of a tile, for the denominators of K-Eq 11.
+//! Sum and sum of squares of every window of a tile: the denominators of K-Eq 11.
 //!
 //! ```text
 //! down:    D(x, y) = Σ_{v<n} q(x, y + v)          across:   W(x, y) = Σ_{u<n} D(x + u, y)          q: d or d²
 //! ```
-//! Down, after van Herk (1992): rows are taken in groups of n; a window is the end of one group, summed upwards once
-//! for all, and the beginning of the next, summed downwards: three additions a number whatever n is.
+//! Down, as van Herk (1992): rows are taken in groups of n; a window is the end of one group, summed upwards once for
+//! all windows, and the beginning of the next, summed downwards: three additions per value for any n.
 //!
-//! Across, by threes as the phases of a `tile` offer them: with n = 3 t + r the three windows that begin at columns
-//! 3 X, 3 X + 1 and 3 X + 2 share the columns from 3 (X + 1) to 3 (X + t) − 1, which are t − 1 sums of three; what each
-//! has besides, before and behind, is at most seven columns.
+//! Across, by triples of columns as in the phases of a `tile`: with n = 3 t + r the three windows that begin at columns
+//! 3 X, 3 X + 1 and 3 X + 2 share the columns from 3 (X + 1) to 3 (X + t) − 1, which are t − 1 triples; each has at most
+//! seven more columns, before and after.
 //!
-//! No sum holds a number from outside its window, so that a bright stone nearby costs a dark window no digits: each
-//! is good to about 1e-7 of itself in `f32`.
+//! No sum contains a value from outside its window, so that a bright stone nearby does not reduce the precision of a
+//! dark window: the relative error of each is about 1e-7 in `f32`.
 
 use pulp::{Simd, WithSimd};
 
@@ -19,27 +19,27 @@ use super::buffer::Buffer;
 use super::lanes::{WIDEST, row_of, row_of_mut};
 use super::tile::{PHASES, TILE_COLUMNS, Tile};
 
-/// Vectors that are summed side by side, so that no addition waits for the one before.
+/// Vectors that are summed side by side, so that no addition waits for the previous one.
 const STRIP: usize = 4;
 
-/// The windows of a tile: q = d first, then q = d².
+/// Sums over the windows of a tile: of q = d first, then of q = d².
 pub(in crate::correlate) struct Moments {
     /// Side of a window, odd and at least 3.
     size: usize,
-    /// Sums of d and d² from a row of the group at hand to its end, for a strip.
+    /// Sums of d and d² from a row of the current group to its end, for a strip.
     ends: Buffer,
-    /// D of every row, in phases as the pixels.
+    /// D of every row, in the phases of the pixels.
     down: [Buffer; 2],
-    /// Sums of D by threes.
+    /// Sums of D over triples of columns.
     triples: [Buffer; 2],
-    /// Rows of D.
+    /// Number of rows of D.
     rows: usize,
     /// W of a row.
     windows: [Buffer; 2],
 }
 
 impl Moments {
-    /// Buffers for up to `rows` rows of windows of `size` × `size` in tiles like `largest`.
+    /// Allocates buffers for up to `rows` rows of windows of `size` × `size` in tiles up to `largest`.
     pub(in crate::correlate) fn new(size: usize, rows: usize, largest: Tile) -> Self {
         let pair = |numbers: usize| [Buffer::new(numbers), Buffer::new(numbers)];
         Self {
@@ -52,8 +52,8 @@ impl Moments {
         }
     }
 
-    /// Sums down the positions of rows `first` to one before `last`, whose pixels are `input` less `level`: D, and D by
-    /// threes.
+    /// Sums down the windows of position rows `first` to one before `last`, with `level` subtracted from the pixels
+    /// `input`: D, and its triples.
     #[inline(always)]
     pub(in crate::correlate) fn down<S: Simd>(
         &mut self,
@@ -85,7 +85,7 @@ impl Moments {
         }
     }
 
-    /// About the mean square of the pixels whose sums were taken: every row of them counts once or twice.
+    /// Approximate mean square of the summed pixels: every row of them counts once or twice.
     #[inline(always)]
     pub(in crate::correlate) fn mean_square<S: Simd>(&self, simd: S, tile: Tile) -> f32 {
         let (mut sum, mut rows, mut row) = (simd.splat_f32s(0.0), 0, 0);
@@ -105,7 +105,7 @@ impl Moments {
         simd.reduce_sum_f32s(sum) / (rows * tile.row_columns()) as f32
     }
 
-    /// Σ d and Σ d² of the windows of row `row` of those summed down.
+    /// Returns Σ d and Σ d² of the windows of row `row`, counted from the first row summed down.
     #[inline(always)]
     pub(in crate::correlate) fn across<S: Simd>(
         &mut self,
@@ -131,12 +131,12 @@ impl Moments {
 /// D of a strip of `X` vectors of a phase.
 struct Down<'a, const X: usize> {
     moments: &'a mut Moments,
-    /// Vectors in a row of the phase.
+    /// Vectors per row of the phase.
     vectors: usize,
-    /// The phase's pixels, and what they are taken less.
+    /// The phase's pixels, and the value subtracted from them.
     input: &'a [f32],
     level: f32,
-    /// First vector of the strip: of the pixels, and of D.
+    /// Index of the strip's first vector in a row of pixels, and in D.
     x: usize,
     to: usize,
     rows: usize,
@@ -173,7 +173,7 @@ impl<const X: usize> WithSimd for Down<'_, X> {
             let mut from = (top + size) * vectors + x;
             for ends in ends[..2 * X * wanted].chunks_exact(2 * X) {
                 let (down, down_squares) = (&mut down[to..to + X], &mut down_squares[to..to + X]);
-                // The row below the window at hand begins the next one.
+                // The row below the current window is part of the next one.
                 let d = &input[from..from + X];
                 for i in 0..X {
                     let d = simd.sub_f32s(d[i], level);
@@ -189,7 +189,7 @@ impl<const X: usize> WithSimd for Down<'_, X> {
     }
 }
 
-/// Sums of three neighbours, all rows.
+/// Sums of triples of columns, in all rows.
 struct Triples<'a> {
     /// D, in phases.
     down: &'a [f32],
@@ -213,12 +213,12 @@ impl WithSimd for Triples<'_> {
 
 /// Sums of windows of 3 t + `R` columns of a row.
 struct Across<'a, const R: usize> {
-    /// t.
+    /// The number of triples, t.
     times: usize,
     tile: Tile,
-    /// Numbers of a phase of D.
+    /// Length of a phase of D.
     plane: usize,
-    /// D and D by threes, from the row on.
+    /// D and its triples, starting at the row.
     down: &'a [f32],
     triples: &'a [f32],
     windows: &'a mut [f32],
@@ -244,7 +244,7 @@ impl<const R: usize> WithSimd for Across<'_, R> {
 }
 
 impl<const R: usize> Across<'_, R> {
-    /// W of `X` vectors of each phase, from the phase's column `x` on.
+    /// Computes W of `X` vectors of each phase, starting at the phase's column `x`.
     #[inline(always)]
     fn strip<S: Simd, const X: usize>(&mut self, simd: S, x: usize) {
         let Self { times, plane, tile: Tile { columns, .. }, .. } = *self;
@@ -260,7 +260,7 @@ impl<const R: usize> Across<'_, R> {
         let (c0, c1, c2) =
             (row_of::<S>(row, 0, X), row_of::<S>(row, plane, X), row_of::<S>(row, 2 * plane, X));
         let (e0, e1) = (row_of::<S>(row, times, X), row_of::<S>(row, plane + times, X));
-        // What no window needs may lie beyond the end.
+        // Columns that no window needs may be past the end.
         let e2 = if R > 0 { row_of::<S>(row, 2 * plane + times, X) } else { c2 };
         let e3 = if R > 1 { row_of::<S>(row, times + 1, X) } else { c0 };
         let (w0, others) = self.windows[x..].split_at_mut(columns);

@@ -1,10 +1,10 @@
-//! From a row of neighbours to the three phases of a `tile`, and back.
+//! Converts a row between adjacent columns and the three phases of a `tile`.
 
 use pulp::{Simd, WithSimd};
 
 use super::tile::PHASES;
 
-/// Parts a row into its phases, each of which holds a third as many numbers.
+/// Splits a row into its phases, each a third as long.
 pub(in crate::correlate) struct Part<'a> {
     pub(in crate::correlate) row: &'a [f32],
     pub(in crate::correlate) phases: [&'a mut [f32]; PHASES],
@@ -16,14 +16,14 @@ impl WithSimd for Part<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         let Self { row, phases: [first, second, third] } = self;
-        // A plain loop over slices of one length: compilers make shuffles of it.
+        // A plain loop over slices of one length, which compilers turn into shuffles.
         for (x, triple) in row.as_chunks().0.iter().enumerate() {
             [first[x], second[x], third[x]] = *triple;
         }
     }
 }
 
-/// Joins the phases of a row, each of which holds a third as many numbers.
+/// Joins the phases of a row, each a third as long.
 pub(in crate::correlate) struct Join<'a> {
     pub(in crate::correlate) phases: [&'a [f32]; PHASES],
     pub(in crate::correlate) row: &'a mut [f32],

@@ -1,4 +1,4 @@
-//! Values at the points, of pixels and of taps, and the sums from the products: see the module above for the equations.
+//! Values of pixels and taps at the points, and the sums from the products; equations in the parent module.
 
 use pulp::{Simd, WithSimd};
 
@@ -12,22 +12,22 @@ pub(super) const ROW_POINTS: usize = 6;
 /// Points of the columns: 0, 1, −1, −2 and ∞.
 pub(super) const COLUMN_POINTS: usize = 5;
 
-/// Products that twelve sums need: `[point of the rows][point of the columns]`.
+/// Products of a group of twelve sums: `[point of the rows][point of the columns]`.
 pub(super) const PRODUCTS: usize = ROW_POINTS * COLUMN_POINTS;
 
-/// The values of a constant 1 at the points of the columns: U of a plane that is nothing but 1.
+/// U of a plane of ones at the points of the columns.
 pub(super) const OF_ONES: [f32; COLUMN_POINTS] = [0.0, 6.0, 0.0, 0.0, 0.0];
 
-/// Rows that one block sums, at most.
+/// Largest number of rows of sums in a block.
 pub(super) const MAX_SIDE: usize = 7;
 
 const ALPHA: f32 = std::f32::consts::FRAC_1_SQRT_2;
 const GAMMA: f32 = std::f32::consts::SQRT_2;
 
-/// Numbers of as many rows as a block has, and one more for even pairs.
+/// One value per row of a block, and one more for even pairs.
 pub(super) type Lanes = [f64; MAX_SIDE + 1];
 
-/// G of three taps D rows apart.
+/// G of three taps, D rows apart.
 #[inline(always)]
 pub(super) fn of_row_taps([h0, h1, h2]: [Lanes; 3]) -> [Lanes; ROW_POINTS] {
     let mut g = [[0.0; MAX_SIDE + 1]; ROW_POINTS];
@@ -44,7 +44,7 @@ pub(super) fn of_row_taps([h0, h1, h2]: [Lanes; 3]) -> [Lanes; ROW_POINTS] {
     g
 }
 
-/// H of three taps side by side.
+/// H of three adjacent taps.
 #[inline(always)]
 pub(super) fn of_column_taps([h0, h1, h2]: [Lanes; 3]) -> [Lanes; COLUMN_POINTS] {
     let mut h = [[0.0; MAX_SIDE + 1]; COLUMN_POINTS];
@@ -58,7 +58,7 @@ pub(super) fn of_column_taps([h0, h1, h2]: [Lanes; 3]) -> [Lanes; COLUMN_POINTS]
     h
 }
 
-/// Where rows and columns stand.
+/// Layout of rows and columns.
 #[derive(Clone, Copy)]
 pub(super) struct Spacing {
     pub(super) tile: Tile,
@@ -67,24 +67,24 @@ pub(super) struct Spacing {
 }
 
 impl Spacing {
-    /// Vectors of `dilations` · D rows of a phase.
+    /// Number of vectors in `dilations` · D rows of a phase.
     #[inline(always)]
     fn vectors<S: Simd>(self, dilations: usize) -> usize {
         dilations * self.dilation * self.tile.pixels / S::F32_LANES
     }
 
-    /// Rows from `row` · D on.
+    /// Vectors starting at row `row` · D.
     #[inline(always)]
     fn rows<S: Simd>(self, values: &[f32], row: usize, vectors: usize) -> &[S::f32s] {
         row_of::<S>(values, row * self.dilation * self.tile.pixels, vectors)
     }
 }
 
-/// U of some rows of pixels: one plane after the other for the points of the columns.
+/// Computes U of some rows of pixels: one plane per point of the columns.
 pub(super) struct ColumnValues<'a> {
     pub(super) tile: Tile,
     pub(super) input: &'a [f32],
-    /// The first row, and one beyond the last.
+    /// The first row, and one past the last.
     pub(super) rows: [usize; 2],
     pub(super) planes: &'a mut [f32],
 }
@@ -104,7 +104,7 @@ impl WithSimd for ColumnValues<'_> {
         let (u2, u3) = (row_of_mut::<S>(u2, from, vectors), row_of_mut::<S>(u3, from, vectors));
         let u4 = row_of_mut::<S>(u4, from, vectors);
         let phase = |phase: usize, on: usize| row_of::<S>(input, phase * tile.plane() + from + on, vectors);
-        // Three columns on: the next number of the same phase. The last one of a row belongs to no sum.
+        // Three columns to the right is the next value of the same phase. The last one of a row is not part of any sum.
         let (d0, d1, d2, d3, d4) = (phase(0, 0), phase(1, 0), phase(2, 0), phase(0, 1), phase(1, 1));
         let (two, three) = (simd.splat_f32s(2.0), simd.splat_f32s(3.0));
         for x in 0..vectors {
@@ -118,13 +118,13 @@ impl WithSimd for ColumnValues<'_> {
     }
 }
 
-/// T of a plane at all points of the rows.
+/// Computes T of a plane at all points of the rows.
 pub(super) struct RowValues<'a> {
     pub(super) spacing: Spacing,
     pub(super) plane: &'a [f32],
-    /// What the plane is taken less.
+    /// Value subtracted from the plane.
     pub(super) level: f32,
-    /// T0 of 3 D rows, of which the last 2 D are T5 of the first, then 2 D rows each of T1 to T4.
+    /// T0 of 3 D rows, the last 2 D of which are T5 of the first, then 2 D rows each of T1 to T4.
     pub(super) values: &'a mut [Buffer; ROW_POINTS - 1],
 }
 
@@ -167,7 +167,7 @@ impl WithSimd for RowValues<'_> {
     }
 }
 
-/// Four rows of three phases of sums from the products, for every row of a dilation.
+/// Computes four rows of sums in three phases from the products, for every row of a dilation.
 pub(super) struct Join<'a> {
     pub(super) spacing: Spacing,
     pub(super) products: &'a [f32],

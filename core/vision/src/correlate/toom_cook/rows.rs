@@ -1,7 +1,7 @@
-//! Rows of sums one by one, Toom–Cook along the columns alone.
+//! Single rows of sums, with Toom–Cook along the columns only.
 //!
-//! What is left over where four dilations of rows would be mostly empty. A place has one accumulator for each point of
-//! the columns, and the whole template passes.
+//! Used for the remaining rows of a tile if a group of four dilations would be mostly empty. A place has one accumulator
+//! per point of the columns; the whole template passes over it.
 
 use pulp::{Simd, WithSimd};
 
@@ -18,12 +18,12 @@ pub(super) struct Rows<'a> {
     pub(super) size: usize,
     pub(super) side: usize,
     pub(super) tile: Tile,
-    /// U of all points, and what the pixels are taken less.
+    /// U at all points, and the value subtracted from the pixels.
     pub(super) planes: &'a [f32],
     pub(super) level: f32,
-    /// First row of positions, and one beyond the last.
+    /// The first row of positions, and one past the last.
     pub(super) rows: [usize; 2],
-    /// Takes the sums, in phases.
+    /// Receives the sums, in phases.
     pub(super) output: &'a mut [f32],
 }
 

@@ -1,9 +1,9 @@
-//! Scores of a row of positions from its sums (K-Eq 11), and which of them these sums are too coarse for.
+//! Scores of a row of positions from its sums (K-Eq 11), with a mark for those that need a more exact computation.
 //!
 //! ```text
 //! ncc = (Σ t j' − Σ t · Σ j'/N) / (|t| sqrt(Σ j'² − (Σ j')²/N))          t: the template as rounded to f32
 //! ```
-//! Pixels are fractions of full scale, less the level of their group of rows; scores have no unit.
+//! Pixels are fractions of full scale, minus the level of their group of rows; scores are dimensionless.
 
 use pulp::{Simd, WithSimd};
 
@@ -14,32 +14,32 @@ use super::phases::Join;
 use super::tile::Tile;
 use crate::image::patch::FLAT_STD;
 
-/// A window's mean may differ from its group's level by this many of its standard deviations: the difference of Σ j'² and
-/// (Σ j')²/N errs by about 1e-7 of Σ j'², so that the score errs by 2e-6 at this limit.
+/// Largest difference of a window's mean from its group's level, in standard deviations of the window. The error of Σ
+/// j'² − (Σ j')²/N is about 1e-7 of Σ j'², so that the score errs by 2e-6 at this limit.
 const MAX_OFFSET_STD: f32 = 6.0;
 
-/// The root mean square of a group of rows, less its level, may be this many of a window's standard deviations: the sums of
+/// Largest root mean square of a group of rows, minus its level, in standard deviations of a window: the sums of
 /// `toom_cook` err by at most 1.2e-6 of it, most by 1e-7.
 const MAX_TILE_STD: f32 = 24.0;
 
-/// In the place of a score that has to be computed by itself.
+/// Placeholder of a score that `exact` must compute.
 pub(in crate::correlate) const DOUBTFUL: f32 = 2.0;
 
-/// What turns the sums of a group of rows into scores.
+/// Constants that convert the sums of a group of rows into scores.
 pub(in crate::correlate) struct Limits {
     /// 1 / N.
     per_count: f32,
-    /// Sum of the template as rounded, and 1 / its norm.
+    /// Sum of the rounded template, and 1 / its norm.
     weights_sum: f32,
     per_norm: f32,
-    /// N times the variance, and N times the variance over the square of the mean's offset, below which a position is
-    /// doubtful.
+    /// Lower bounds of N times the variance of a position that is not doubtful: absolute, and over the square of the
+    /// mean's offset.
     floor: f32,
     offset_limit: f32,
 }
 
 impl Limits {
-    /// For a template, its sum and norm as rounded, and a group of this mean square.
+    /// Limits for a template, with the sum and norm of its rounded values, and a group of this mean square.
     pub(in crate::correlate) fn of(
         template: &Template,
         mean_square: f32,
@@ -51,26 +51,26 @@ impl Limits {
             per_count: 1.0 / count,
             weights_sum,
             per_norm: 1.0 / weights_norm,
-            // Without contrast in the template every position takes the exact way, which counts it.
+            // Without contrast in the template every position is computed by `exact`, which counts it.
             floor: if template.is_flat { f32::INFINITY } else { floor },
             offset_limit: count / MAX_OFFSET_STD.powi(2),
         }
     }
 }
 
-/// Scores one row; says whether any of them is [`DOUBTFUL`].
+/// Scores one row; returns whether any of them is [`DOUBTFUL`].
 pub(in crate::correlate) struct ScoreRow<'a> {
     pub(in crate::correlate) limits: &'a Limits,
     pub(in crate::correlate) tile: Tile,
-    /// Which row of the tile.
+    /// Index of the row in its group.
     pub(in crate::correlate) y: usize,
-    /// Its numerators, in phases.
+    /// Numerators of the row, in phases.
     pub(in crate::correlate) numerators: &'a [f32],
     pub(in crate::correlate) moments: &'a mut Moments,
-    /// Takes the scores in phases, and in their order up to whole vectors.
+    /// Buffers for the scores, in phases and in column order, in whole vectors.
     pub(in crate::correlate) phases: &'a mut [f32],
     pub(in crate::correlate) row: &'a mut [f32],
-    /// Where the scores go.
+    /// Receives the scores.
     pub(in crate::correlate) scores: &'a mut [f32],
 }
 
@@ -108,10 +108,11 @@ impl WithSimd for ScoreRow<'_> {
     }
 }
 
-/// 1/√x for a positive, normal x, at most 7e-7 of itself too small; any value otherwise.
+/// 1/√x for a positive, normal x, too small by at most 7e-7 of itself; any value otherwise.
 ///
-/// Half of the exponent and a line for the rest of the logarithm, then two steps after Newton, the first with the
-/// factors of Kadlec (2010), which leave 6.5e-4: root and quotient of the processor take three times as long.
+/// Halves the exponent, approximates the logarithm of the mantissa by a line, then takes two Newton steps, the first
+/// with the factors of Kadlec (2010), which leaves 6.5e-4. The processor's square root and division take three times as
+/// long.
 #[inline(always)]
 fn inverse_sqrt<S: Simd>(simd: S, x: S::f32s) -> S::f32s {
     let half_bits = simd.wrapping_dyn_shr_u32s(simd.transmute_u32s_f32s(x), simd.splat_u32s(1));

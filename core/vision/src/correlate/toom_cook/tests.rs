@@ -1,13 +1,13 @@
-//! Tests of the sums of a tile: every instruction set of this processor against the definition in `f64`.
+//! Sums of a tile with every instruction set of this processor, against the definition in `f64`.
 
 use super::moments::Moments;
 use super::phases::{self, Part};
 use super::*;
 
-/// Groups of rows of the tiles.
+/// Number of groups of rows in a tile.
 const GROUPS: usize = 2;
 
-/// What the pixels are taken less.
+/// Value subtracted from the pixels.
 const LEVEL: f32 = 0.125;
 
 /// A tile of hashed pixels between −0.5 and 0.5 and a hashed template.
@@ -15,7 +15,7 @@ struct Case {
     size: usize,
     template: Vec<f32>,
     filters: Filters,
-    /// Pixels, rows of `input_columns`.
+    /// Pixels, in rows of `input_columns`.
     pixels: Vec<f32>,
     input_columns: usize,
 }
@@ -43,7 +43,7 @@ impl Case {
         planes.concat()
     }
 
-    /// Σ over a window of what `term` makes of template and pixel.
+    /// Σ over a window of `term` of template and pixel.
     fn expected(&self, [x, y]: [usize; 2], term: impl Fn(f64, f64) -> f64) -> f64 {
         let values = self.template.iter().enumerate();
         values
@@ -66,7 +66,7 @@ impl Case {
         self.assert_sums_from(simd, found, tile, [0, rows, columns], term);
     }
 
-    /// Compares those of the rows from `top` to one before `bottom`.
+    /// Compares the sums of the rows from `top` to one before `bottom`.
     fn assert_sums_from<S: Simd>(
         &self,
         simd: S,

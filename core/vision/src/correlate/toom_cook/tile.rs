@@ -1,31 +1,31 @@
-//! A tile of positions and the pixels under it, by column modulo three.
+//! Layout of a tile of positions and of the pixels under it: by column modulo three.
 //!
 //! ```text
-//! phase p, p < 3, of a row holds its columns 3 X + p:    p₀ p₀ p₀ … | p₁ p₁ p₁ … | p₂ p₂ p₂ …
+//! phase p, p < 3, of a row: its columns 3 X + p    p₀ p₀ p₀ … | p₁ p₁ p₁ … | p₂ p₂ p₂ …
 //! ```
-//! Three columns on is then one number on in the same phase, for pixels, sums and scores alike: `toom_cook` takes the
-//! columns of a template three at a time, and `moments` sums windows by threes.
+//! Three columns to the right is then the next value of the same phase, for pixels, sums and scores: `toom_cook`
+//! processes the columns of a template three at a time, and `moments` sums windows by triples.
 //!
-//! Of pixels, and of what is made of them, first come all rows of the first phase, `pixels` numbers each, then those of
-//! the second and of the third, so that most work is one run over numbers that follow each other. Sums have the phases
-//! of a row side by side, `columns` numbers each. Both are whole vectors.
+//! Pixels, and values derived from them, are stored phase by phase: all rows of the first phase, `pixels` values each,
+//! then those of the second and of the third, so that most loops run over consecutive values. Sums have the phases of a
+//! row side by side, `columns` values each. Both are whole vectors.
 
 use super::lanes::WIDEST;
 
-/// Phases of a row.
+/// Number of phases of a row.
 pub(in crate::correlate) const PHASES: usize = 3;
 
-/// Columns of positions of the largest tile: in each phase three of the widest vectors.
+/// Columns of positions of the largest tile: three of the widest vectors per phase.
 pub(in crate::correlate) const TILE_COLUMNS: usize = PHASES * 3 * WIDEST;
 
-/// The extent of a tile.
+/// Size of a tile.
 #[derive(Clone, Copy)]
 pub(in crate::correlate) struct Tile {
-    /// Numbers of a phase in a row of sums.
+    /// Values per phase in a row of sums.
     pub(in crate::correlate) columns: usize,
-    /// Numbers of a phase in a row of pixels.
+    /// Values per phase in a row of pixels.
     pub(in crate::correlate) pixels: usize,
-    /// Rows of pixels.
+    /// Number of rows of pixels.
     pub(in crate::correlate) pixel_rows: usize,
 }
 
@@ -37,17 +37,17 @@ impl Tile {
         Self { columns, pixels, pixel_rows }
     }
 
-    /// Numbers of a row of sums.
+    /// Length of a row of sums.
     pub(in crate::correlate) fn row_columns(self) -> usize {
         PHASES * self.columns
     }
 
-    /// Numbers of a row of pixels.
+    /// Length of a row of pixels.
     pub(in crate::correlate) fn row_pixels(self) -> usize {
         PHASES * self.pixels
     }
 
-    /// Numbers of all pixels of a phase.
+    /// Number of pixels of a phase.
     pub(in crate::correlate) fn plane(self) -> usize {
         self.pixel_rows * self.pixels
     }
