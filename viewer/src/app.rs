@@ -1,4 +1,4 @@
-//! The application: lays the panels out and carries their commands to state, arrangement and network.
+//! The application: lays out the panels, and passes their commands to the state, the layout and the network.
 
 use egui::{CentralPanel, Context, Frame, Margin, Panel, Ui};
 
@@ -7,7 +7,7 @@ use crate::command::Command;
 use crate::command::keys;
 use crate::command::{help, palette};
 use crate::exports::window as exports_window;
-use crate::figure::wish::Wish;
+use crate::figure::request::FigureRequest;
 use crate::files::download;
 use crate::files::inbox::Inbox;
 use crate::files::window as files_window;
@@ -26,17 +26,17 @@ use crate::panels::pane::{Need, Pane};
 use crate::panels::{bars, card, timeline};
 use crate::state::State;
 use crate::state::effect::Effect;
-use crate::state::pointed;
+use crate::state::hovered;
 use crate::tour::bubbles;
 use crate::trackability::limits_window;
 use crate::{figure, theme, tour};
 
-/// Where a page begins.
+/// The server and the view that a page opens with.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Link {
-    /// Where the server is, without a slash at the end.
+    /// Base URL of the server, without a trailing slash.
     pub origin: String,
-    /// What to open; without a session the latest of the first traverse, or a new one.
+    /// The view to open. Without a session: the latest session of the first traverse, or a new one.
     pub fragment: Fragment,
 }
 
@@ -47,27 +47,27 @@ pub struct SightlineApp {
     workspace: Workspace,
     left_image: LeftImage,
     publisher: Publisher,
-    /// The link as the page's address has it.
+    /// The link as it is in the page's address.
     linked: Fragment,
-    kept: storage::Kept,
-    is_tour_kept: bool,
-    /// Where the panels are on the screen, points.
+    stored: storage::StoredSettings,
+    is_tour_stored: bool,
+    /// Screen rectangles of the panels, points.
     places: Vec<(Pane, egui::Rect)>,
     inbox: Inbox,
-    /// Effects of answers and events that wait for the frame.
+    /// Effects of replies and events, carried out in the next frame.
     waiting: Vec<Effect>,
 }
 
 impl SightlineApp {
-    /// The application as it is when the page opens.
+    /// The application in its initial state.
     pub fn new(context: &Context, link: Link) -> Self {
-        let kept = storage::Kept::read();
+        let stored = storage::StoredSettings::read();
         let mut state = State::new(link.origin.clone(), link.fragment.session.clone());
-        state.looks = kept.looks().unwrap_or_default();
-        state.single_keys = kept.single_keys();
-        state.stretch = kept.stretch().unwrap_or_default();
-        theme::apply(context, state.looks);
-        let mut workspace = Workspace::restored(kept.layout());
+        state.colour_theme = stored.colour_theme().unwrap_or_default();
+        state.single_keys = stored.single_keys();
+        state.stretch = stored.stretch().unwrap_or_default();
+        theme::apply(context, state.colour_theme);
+        let mut workspace = Workspace::restored(stored.layout());
         if let Some(preset) = link.fragment.preset.filter(|preset| *preset != workspace.preset()) {
             workspace.apply(LayoutCommand::Use(preset));
         }
@@ -75,7 +75,7 @@ impl SightlineApp {
         let linked = link.fragment.clone();
         state.open_link(link.fragment);
         state.tour.is_seen = tour::was_seen();
-        let is_tour_kept = state.tour.is_seen;
+        let is_tour_stored = state.tour.is_seen;
         let net = Net::new(link.origin, context.clone());
         let (left_image, publisher, places) = (None, Publisher::default(), Vec::new());
         let inbox = Inbox::new(context.clone());
@@ -86,24 +86,24 @@ impl SightlineApp {
             left_image,
             publisher,
             linked,
-            kept,
-            is_tour_kept,
+            stored,
+            is_tour_stored,
             places,
             inbox,
             waiting: Vec::new(),
         }
     }
 
-    /// Takes in what arrived and asks for what is missing.
+    /// Applies the replies and events that have arrived, and requests missing data.
     fn exchange(&mut self, context: &Context) {
         let now = context.input(|input| input.time);
         let (events, connection) = self.net.poll_events(now);
         for event in events {
-            self.state.told(event);
+            self.state.apply_event(event);
         }
         self.state.connected(connection);
-        for arrived in self.net.poll() {
-            self.state.arrived(arrived, now);
+        for completed in self.net.poll() {
+            self.state.apply_reply(completed, now);
         }
         for arrival in self.inbox.poll() {
             self.state.file_arrived(arrival);
@@ -111,23 +111,24 @@ impl SightlineApp {
         self.state.files.is_hovered = self.inbox.is_hovered();
         self.state.tick(now);
         self.send();
-        self.ask_for_missing(now);
+        self.request_missing_items(now);
     }
 
-    /// Asks for what the cursor's step needs and is not there.
-    fn ask_for_missing(&mut self, now: f64) {
+    /// Requests the items that the current view needs and the cache lacks.
+    fn request_missing_items(&mut self, now: f64) {
         if matches!(self.state.connection, Connection::Gone { .. }) {
             return;
         }
-        let wanted = self.state.wanted();
-        let slow = self.state.unrendered(&wanted);
+        let needed = self.state.needed_items();
+        let slow = self.state.unrendered(&needed);
         let (cache, net) = (&mut self.state.cache, &mut self.net);
-        for key in cache.want(&wanted, |key| net.take_place(key, slow.contains(key)), now) {
+        for key in cache.request(&needed, |key| net.take_place(key, slow.contains(key)), now) {
             self.net.send(Request::Item(key));
         }
     }
 
-    /// Wakes the page when something is to be tried again: only from within a frame does egui keep that.
+    /// Schedules a repaint for the next retry. Called from within a frame because egui drops repaint requests made
+    /// elsewhere.
     fn wake_for_retries(&self, context: &Context) {
         let is_gone = matches!(self.state.connection, Connection::Gone { .. });
         let item = self.state.cache.next_retry().filter(|_| !is_gone);
@@ -137,15 +138,15 @@ impl SightlineApp {
         }
     }
 
-    /// Wakes the page when the next step is due that plays.
+    /// Schedules a repaint for the next step of playback.
     fn wake_for_play(&self, context: &Context) {
-        if let Some(due) = self.state.ask.play.due_s() {
+        if let Some(due) = self.state.breakpoints.play.due_s() {
             let now = context.input(|input| input.time);
             context.request_repaint_after(std::time::Duration::from_secs_f64((due - now).max(0.0)));
         }
     }
 
-    /// Sends the requests that answers and events led to; other effects wait for [`Self::settle`].
+    /// Sends the requests that replies and events led to; other effects wait for [`Self::settle`].
     fn send(&mut self) {
         for effect in self.state.take_effects() {
             match effect {
@@ -155,7 +156,7 @@ impl SightlineApp {
         }
     }
 
-    /// Carries out what waits: within a frame, since only there egui takes new tabs and copied text.
+    /// Carries out the waiting effects. Called within a frame, because egui opens tabs and copies text only there.
     fn settle(&mut self, context: &Context) {
         self.send();
         for effect in std::mem::take(&mut self.waiting) {
@@ -170,8 +171,8 @@ impl SightlineApp {
             Effect::OpenUrl(url) => context.open_url(egui::OpenUrl::new_tab(url)),
             Effect::CopyLink => self.copy_link(context),
             Effect::Layout(command) => self.workspace.apply(command),
-            Effect::UseLooks(looks) => theme::apply(context, looks),
-            Effect::SaveFigure(wish) => self.save_figure(context, wish),
+            Effect::UseColourTheme(colour_theme) => theme::apply(context, colour_theme),
+            Effect::SaveFigure(request) => self.save_figure(context, request),
             #[cfg(target_arch = "wasm32")]
             Effect::ChooseFile | Effect::ReadFile(_) => self.inbox.choose(),
             #[cfg(not(target_arch = "wasm32"))]
@@ -182,7 +183,7 @@ impl SightlineApp {
             Effect::SendRecording(upload) => self.inbox.send_recording(&self.state.origin, upload),
             #[cfg(target_arch = "wasm32")]
             Effect::StopSending => self.inbox.stop_sending(),
-            // Outside a browser a file is named by its path.
+            // Outside a browser, files are opened by path.
             #[cfg(not(target_arch = "wasm32"))]
             Effect::ChooseFile
             | Effect::ChooseRecording { .. }
@@ -191,7 +192,7 @@ impl SightlineApp {
         }
     }
 
-    /// Lays everything out and gathers what was asked for.
+    /// Lays out all panels and returns their commands.
     fn lay_out(&mut self, ui: &mut Ui) -> Vec<Command> {
         let mut out = Vec::new();
         let state = &self.state;
@@ -241,17 +242,17 @@ impl SightlineApp {
         out
     }
 
-    /// Takes in what the pointer rests on: the next frame shows it in all panels.
+    /// Takes the hovered location out of the commands; all panels show it in the next frame.
     fn point(&mut self, context: &Context, commands: &mut Vec<Command>) {
-        let pointed = pointed::taken(context, commands);
-        if pointed != self.state.pointed {
-            self.state.pointed = pointed;
+        let hovered = hovered::take_hovered(context, commands);
+        if hovered != self.state.hovered {
+            self.state.hovered = hovered;
             context.request_repaint();
         }
     }
 
-    /// Takes the keys in. Steps are taken at once, so that the frame of the key shows where they lead; the rest, which
-    /// follows what the page shows, is returned.
+    /// Handles the keys of this frame. Steps are applied at once, so that this frame shows their destination. The remaining
+    /// commands depend on the view and are returned.
     fn take_keys(&mut self, context: &Context) -> Vec<Command> {
         let mut all = keys::commands(context, &self.state);
         let steps = all.iter().take_while(|command| command.is_step()).count();
@@ -260,18 +261,18 @@ impl SightlineApp {
         }
         all.truncate(steps);
         self.apply(context, all);
-        self.ask_for_missing(context.input(|input| input.time));
-        // What follows is meant for the step to which they led.
+        self.request_missing_items(context.input(|input| input.time));
+        // Later keys apply to the step that the earlier ones led to.
         keys::commands(context, &self.state).into_iter().skip(steps).collect()
     }
 
-    /// Applies what was asked for.
+    /// Applies the commands of a frame.
     fn follow(&mut self, context: &Context, commands: Vec<Command>) {
         if commands.is_empty() {
             return;
         }
         self.apply(context, commands);
-        // What was asked for shows in the next frame, which otherwise only comes with the next event.
+        // The result is visible in the next frame, which egui would otherwise draw only at the next input event.
         context.request_repaint();
     }
 
@@ -285,30 +286,30 @@ impl SightlineApp {
         self.send();
     }
 
-    /// Saves the figure that was asked for.
-    fn save_figure(&mut self, context: &Context, wish: Wish) {
-        let file = figure::save::take(context, &self.state, &self.places, wish);
-        let kept = file.and_then(|file| {
-            download::keep(&file.name, file.media_type, &file.bytes)?;
+    /// Saves the requested figure.
+    fn save_figure(&mut self, context: &Context, request: FigureRequest) {
+        let file = figure::save::take(context, &self.state, &self.places, request);
+        let saved = file.and_then(|file| {
+            download::save(&file.name, file.media_type, &file.bytes)?;
             Ok(file.sentence)
         });
-        match kept {
+        match saved {
             Ok(sentence) => self.state.messages.note(sentence),
             Err(sentence) => self.state.messages.problem(sentence, None),
         }
     }
 
-    /// What the page's address should say.
+    /// The current view as the fragment of the page's address.
     fn fragment(&self) -> Fragment {
         let preset = Some(self.workspace.preset());
         Fragment { preset, unknown: self.linked.unknown.clone(), ..self.state.fragment() }
     }
 
-    /// Remembers that the tour was seen.
+    /// Stores that the tour was seen.
     fn keep_tour(&mut self) {
-        if self.state.tour.is_seen && !self.is_tour_kept {
+        if self.state.tour.is_seen && !self.is_tour_stored {
             tour::remember_seen();
-            self.is_tour_kept = true;
+            self.is_tour_stored = true;
         }
     }
 
@@ -322,7 +323,7 @@ impl SightlineApp {
         self.state.messages.note("The link to what you see is copied.");
     }
 
-    /// Follows an address that was changed by Back or by hand, and writes what is looked at into it.
+    /// Follows an address that the user changed, by Back or by hand; otherwise writes the current view into the address.
     fn keep_link(&mut self) {
         #[cfg(target_arch = "wasm32")]
         {
@@ -355,7 +356,7 @@ impl eframe::App for SightlineApp {
         keys::leave_clicked(ui.ctx());
         let context = ui.ctx().clone();
         let keys = self.take_keys(&context);
-        // What the pointer did comes first: Esc at the end of a drag takes back what the drag tried.
+        // Pointer commands go first: Esc at the end of a drag undoes what the drag tried.
         let mut commands = self.lay_out(ui);
         self.point(&context, &mut commands);
         commands.extend(keys);
@@ -363,7 +364,7 @@ impl eframe::App for SightlineApp {
         self.settle(&context);
         self.keep_link();
         self.keep_tour();
-        self.kept.write(&context, &self.state, || self.workspace.kept());
+        self.stored.write(&context, &self.state, || self.workspace.to_stored());
         self.wake_for_retries(&context);
         self.wake_for_play(&context);
         self.publisher.publish(&self.state, &self.left_image, context.zoom_factor());

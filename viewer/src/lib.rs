@@ -3,24 +3,24 @@
 //! | folder or file | contents |
 //! |---|---|
 //! | `app` | the frame loop: lays the panels out, applies their commands, carries out the effects |
-//! | `command` | what the user can ask for: the commands, the table of names and keys, palette and help sheet |
-//! | `state` | the one value of which every panel is a view; `apply` returns effects |
-//! | `net`, `cache`, `tables` | requests, events, and loaded data within a limit of memory |
+//! | `command` | the user's commands, the table of their names and keys, the palette and the help sheet |
+//! | `state` | the application state that all panels display; `apply` returns effects |
+//! | `net`, `cache`, `tables` | requests, events, and loaded data within a memory limit |
 //! | `panels` | the table of panels, the trait `Panel`, and the panels that belong to no feature below |
-//! | `layout` | arrangements of the panels |
+//! | `layout` | layouts of the panels |
 //! | `compare` | comparing runs |
-//! | `why`, `what_if` | where a value came from, what would have saved a step, and changes that are tried out |
-//! | `breakpoints` | breakpoints, derived columns, and playing the drive |
-//! | `picking`, `trackability` | designating a target, and how well a target would do |
+//! | `why`, `what_if` | origins of values, counterfactuals of a lost step, and trial changes |
+//! | `breakpoints` | breakpoints, derived columns, and playback of the drive |
+//! | `picking`, `trackability` | designating a target, and the expected tracking quality of a target |
 //! | `notes`, `studies`, `tour` | notes, validation studies, and the tour for a new user |
 //! | `files`, `exports`, `figure` | opening files, exporting the session, and panels as figures |
 //! | `drawing`, `theme` | canvas, marks and textures; colours and text styles |
-//! | `stage`, `pointed`, `shape_view` | the stages; what the pointer rests on; the selection in the shape panel |
-//! | `access` | the page for a screen reader: egui's tree as elements of the document |
+//! | `stage`, `hovered`, `shape_view` | the stages; the hovered location; the selection in the shape panel |
+//! | `access` | the page for screen readers: egui's accessibility tree as DOM elements |
 //! | `page` | address, storage and status of the page |
 //!
-//! A feature's folder has its data, with what a person asks of it, in `mod.rs`, what becomes of that in `update`, its panel
-//! in `panel` or a window in `window`, and its tests in `tests`.
+//! A feature's folder contains its data and commands in `mod.rs`, their effect on the state in `update`, its panel in
+//! `panel` or its window in `window`, and its tests in `tests`.
 
 mod app;
 mod breakpoints;
@@ -49,7 +49,7 @@ mod panels;
 mod layout;
 mod theme;
 mod access;
-mod pointed;
+mod hovered;
 mod figure;
 #[cfg(test)]
 mod tests;

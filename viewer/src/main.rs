@@ -2,7 +2,7 @@
 
 use sightline_viewer::{Fragment, Link, SightlineApp};
 
-/// Where the server listens unless it is told otherwise.
+/// The default address of the server.
 const DEFAULT: &str = "http://127.0.0.1:7700";
 
 fn main() -> eframe::Result {
@@ -15,7 +15,7 @@ fn main() -> eframe::Result {
     )
 }
 
-/// The server and session that an address names.
+/// Splits an address into server and session.
 fn link(address: &str) -> Link {
     let (origin, fragment) = address.split_once('#').unwrap_or((address, ""));
     Link { origin: origin.trim_end_matches('/').to_owned(), fragment: Fragment::parse(fragment) }

@@ -1,26 +1,26 @@
-//! What is looked at of a registration by shape: which part, with which limit of colours, and from where.
+//! The selection in the shape panel: the part, the limit of the colours, and the viewpoint of the meshes.
 
-/// The parts of the panel about shape, in the order in which a registration makes them.
+/// The parts of the shape panel, in the order in which a registration computes them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Part {
-    /// Disparities and ranges of the stop.
+pub enum ShapePart {
+    /// Disparities and ranges of the stop (dense stereo).
     Surface,
-    /// The virtual range sensor and the errors of depth in it.
+    /// Depth maps of the virtual range sensor, and their differences.
     #[default]
     Sensor,
-    /// The coarse search and the way of the refinement.
+    /// The coarse search, and the iterations of the refinement.
     Search,
-    /// Both meshes in space.
+    /// Both meshes in 3-D.
     Meshes,
-    /// The picture of the last camera in the image of the next one.
+    /// The image of the previous camera, draped over its mesh and rendered for the next camera.
     HandOff,
 }
 
-impl Part {
-    /// All of them.
+impl ShapePart {
+    /// All parts, in order.
     pub const ALL: [Self; 5] = [Self::Surface, Self::Sensor, Self::Search, Self::Meshes, Self::HandOff];
 
-    /// Its name.
+    /// The title in the panel.
     pub const fn title(self) -> &'static str {
         match self {
             Self::Surface => "Surface",
@@ -32,14 +32,14 @@ impl Part {
     }
 }
 
-/// From where the meshes are seen: turned from the camera's own view.
+/// Viewpoint of the meshes, as rotations from the camera's own view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Orbit {
-    /// About the vertical, rad; positive: the eye goes to the right.
+    /// Rotation about the vertical, rad; positive: the viewpoint moves to the right.
     pub yaw_rad: f64,
-    /// About the horizontal of the screen, rad; positive: the eye goes up.
+    /// Rotation about the horizontal of the screen, rad; positive: the viewpoint moves up.
     pub pitch_rad: f64,
-    /// Magnification beyond that at which all of it fits.
+    /// Magnification relative to the view that fits both meshes.
     pub zoom: f64,
 }
 
@@ -50,10 +50,10 @@ impl Default for Orbit {
 }
 
 impl Orbit {
-    /// How far a drag by one point turns, rad.
+    /// Rotation per point of a drag, rad.
     const TURN: f64 = 0.01;
 
-    /// After a drag of so many points.
+    /// The viewpoint after a drag, points.
     #[must_use]
     pub fn turned(self, right: f32, down: f32) -> Self {
         let yaw_rad = (self.yaw_rad - Self::TURN * f64::from(right)) % std::f64::consts::TAU;
@@ -61,21 +61,21 @@ impl Orbit {
         Self { yaw_rad, pitch_rad: pitch_rad.clamp(-1.55, 1.55), ..self }
     }
 
-    /// Magnified by a factor.
+    /// The viewpoint with its magnification multiplied by a factor.
     #[must_use]
     pub(crate) fn zoomed(self, factor: f64) -> Self {
         Self { zoom: (self.zoom * factor).clamp(0.2, 40.0), ..self }
     }
 }
 
-/// What is looked at.
+/// The selection in the shape panel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ShapeView {
     /// The part.
-    pub part: Part,
-    /// Errors of depth are coloured from minus this to this, m; none: what nearly all of them keep to.
+    pub part: ShapePart,
+    /// The colours of depth errors range from minus to plus this, m; `None`: a limit that covers nearly all errors.
     pub error_limit_m: Option<f64>,
-    /// From where the meshes are seen.
+    /// Viewpoint of the meshes.
     pub orbit: Orbit,
 }
 

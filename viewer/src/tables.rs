@@ -1,4 +1,4 @@
-//! The tables of the trackers as they come from the server, and which of their rows are looked at.
+//! The trackers' tables as received from the server, and the filter of the features.
 
 use sightline_track::locate::features::evidence::{CLOUD_COLUMNS, FeatureColumn};
 use sightline_track::locate::features::rows::{self, CloudPoint, Feature, Matched};
@@ -11,21 +11,21 @@ use sightline_vision::image::npy;
 pub enum Table {
     /// The features of the left image.
     Features(Vec<Feature>),
-    /// Where the bootstrap puts the target.
+    /// The bootstrap distribution of the target.
     Cloud(Vec<CloudPoint>),
-    /// The way of a refinement.
+    /// The iterations of a refinement.
     Path(Vec<PathStep>),
     /// The facets of a mesh.
     Facets(Vec<Facet>),
 }
 
 impl Table {
-    /// Whether an array is a table and no picture.
+    /// Whether an array is a table rather than an image.
     pub fn is_table(name: ArrayName) -> bool {
         Self::columns(name).is_some()
     }
 
-    /// How many columns a table has; none for a picture.
+    /// Number of columns of a table; `None` for an image.
     fn columns(name: ArrayName) -> Option<usize> {
         match name {
             ArrayName::FEATURES => Some(FeatureColumn::COUNT),
@@ -36,10 +36,10 @@ impl Table {
         }
     }
 
-    /// A table from its NumPy file.
+    /// Reads a table from its NumPy file.
     ///
     /// # Errors
-    /// A sentence when the bytes are no 2-D array of numbers with this table's columns.
+    /// A sentence if the bytes are not a 2-D array of numbers with this table's columns.
     pub fn from_npy(name: ArrayName, bytes: &[u8]) -> Result<Self, String> {
         let values = npy::decode(bytes, name.word()).map_err(|e| e.to_string())?;
         let columns = Self::columns(name).unwrap_or_default();
@@ -57,7 +57,7 @@ impl Table {
         })
     }
 
-    /// Memory that the rows take.
+    /// Memory size of the rows, bytes.
     pub fn bytes(&self) -> usize {
         match self {
             Self::Features(rows) => rows.len() * size_of::<Feature>(),
@@ -68,19 +68,19 @@ impl Table {
     }
 }
 
-/// What became of a feature.
+/// The outcome of matching a feature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// It has no match with the earlier stop.
+pub enum MatchOutcome {
+    /// No match with the earlier stop.
     Unmatched,
-    /// Its match agrees with the motion.
+    /// Its match is an inlier of the motion.
     Inlier,
-    /// Its match does not.
+    /// Its match is an outlier.
     Outlier,
 }
 
-impl Kind {
-    /// What became of `feature`.
+impl MatchOutcome {
+    /// The outcome for `feature`.
     pub fn of(feature: &Feature) -> Self {
         match &feature.matched {
             None => Self::Unmatched,
@@ -90,14 +90,14 @@ impl Kind {
     }
 }
 
-/// How features are looked at: which are shown, and how long their residuals are drawn.
+/// Filter of the displayed features, and magnification of their residuals.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FeatureView {
-    /// Least and largest residual of a match that is shown, m; features without a match have none and pass.
+    /// Range of the displayed residuals, m. Features without a match have no residual and pass.
     pub residual_m: [f64; 2],
-    /// Least and largest scale of a feature that is shown, px.
+    /// Range of the displayed feature scales, px.
     pub sigma_px: [f64; 2],
-    /// How much longer than it is a residual is drawn.
+    /// Factor by which the drawn residuals are lengthened.
     pub magnification: f64,
 }
 
@@ -116,19 +116,19 @@ impl FeatureView {
         within(feature.sigma_px, self.sigma_px) && residual_m.is_none_or(|r| within(r, self.residual_m))
     }
 
-    /// How many features of a kind there are, and how many of them are shown.
-    pub fn count(&self, features: &[Feature], kind: Kind) -> Count {
-        let of_kind = || features.iter().filter(|feature| Kind::of(feature) == kind);
+    /// Counts the features of a kind, and those of them that are shown.
+    pub fn count(&self, features: &[Feature], kind: MatchOutcome) -> Count {
+        let of_kind = || features.iter().filter(|feature| MatchOutcome::of(feature) == kind);
         Count { all: of_kind().count(), shown: of_kind().filter(|feature| self.shows(feature)).count() }
     }
 }
 
-/// How many there are, and how many of them are shown.
+/// Number of features, and of those that are shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Count {
-    /// All of them.
+    /// Number of all features.
     pub all: usize,
-    /// Those that pass the filters.
+    /// Number of features that pass the filter.
     pub shown: usize,
 }
 
@@ -164,9 +164,9 @@ mod tests {
         assert!(!view.shows(&feature(1.9, Some(0.01))));
         assert!(view.shows(&feature(5.0, None)));
         let features = [feature(3.0, Some(0.01)), feature(3.0, Some(0.025)), feature(3.0, Some(1.0))];
-        assert_eq!(view.count(&features, Kind::Inlier).words(), "1 of 2");
-        assert_eq!(view.count(&features, Kind::Outlier).words(), "0 of 1");
-        assert_eq!(FeatureView::default().count(&features, Kind::Outlier).words(), "1");
+        assert_eq!(view.count(&features, MatchOutcome::Inlier).words(), "1 of 2");
+        assert_eq!(view.count(&features, MatchOutcome::Outlier).words(), "0 of 1");
+        assert_eq!(FeatureView::default().count(&features, MatchOutcome::Outlier).words(), "1");
     }
 
     #[test]

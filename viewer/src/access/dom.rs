@@ -1,7 +1,7 @@
-//! The elements of the mirror: made, changed and removed so that they are what the outline says.
+//! The DOM elements of the mirror: created, changed and removed to match the outline.
 //!
-//! They lie over the canvas, cannot be seen, and let the pointer through. The one element that changes without being
-//! touched is the status, a live region whose words a screen reader speaks when they change.
+//! They are invisible elements above the canvas and do not intercept the pointer. The status element is a live region: a
+//! screen reader speaks its text whenever it changes.
 
 use std::cell::RefCell;
 use std::collections::{HashMap, HashSet};
@@ -14,46 +14,46 @@ use web_sys::{Document, Element, HtmlElement, HtmlInputElement, HtmlTextAreaElem
 
 use crate::access::outline::{Entry, Tag};
 
-/// The element in which the mirror lies.
+/// Id of the element that contains the mirror.
 const ROOT: &str = "sightline-mirror";
-/// The element whose words are spoken when they change.
+/// Id of the live region whose text is spoken when it changes.
 const STATUS: &str = "sightline-status";
-/// The attribute with AccessKit's number.
+/// The attribute with the node id of AccessKit.
 const NUMBER: &str = "data-node";
 
 thread_local! {
     static DOM: RefCell<Option<Dom>> = const { RefCell::new(None) };
-    /// What was done to elements since the last frame.
+    /// User actions on the elements since the last frame.
     static REQUESTED: RefCell<Vec<Event>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Passes on what was done to an element; the caller wakes the page.
+/// Queues a user action on an element; the caller wakes the page.
 fn request(event: Event) {
     REQUESTED.with_borrow_mut(|events| events.push(event));
 }
 
-/// What was done to elements since the last frame.
+/// Removes and returns the user actions on the elements since the last frame.
 pub(crate) fn take_requests() -> Vec<Event> {
     REQUESTED.take()
 }
 
-/// Begins the mirror; the page works all the same where the document refuses it.
+/// Creates the mirror; if the document refuses it, the page works without one.
 pub(crate) fn begin(context: &egui::Context) {
     DOM.with_borrow_mut(|dom| *dom = Dom::begin(context).ok());
 }
 
-/// Makes the elements what `entries` say; `focus` is the number of the node that has the keyboard.
+/// Updates the elements to match `entries`; `focus` is the id of the focused node.
 pub(crate) fn show(entries: &[Entry], focus: u64) {
     DOM.with_borrow_mut(|dom| {
         if let Some(dom) = dom {
-            // An element that the browser refuses is missing for the screen reader; the canvas is not touched.
+            // An element that the browser refuses is missing for the screen reader; the canvas is unaffected.
             dom.show(entries).unwrap_or_default();
             dom.point_at(focus).unwrap_or_default();
         }
     });
 }
 
-/// Speaks a sentence, once.
+/// Makes a screen reader speak a sentence once.
 pub(crate) fn speak(sentence: &str) {
     DOM.with_borrow(|dom| {
         if let Some(dom) = dom {
@@ -62,7 +62,7 @@ pub(crate) fn speak(sentence: &str) {
     });
 }
 
-struct Shown {
+struct ShownEntry {
     element: Element,
     entry: Entry,
 }
@@ -71,8 +71,8 @@ struct Dom {
     document: Document,
     root: Element,
     status: Element,
-    shown: HashMap<u64, Shown>,
-    /// The children of each element in order; the root's under none.
+    shown: HashMap<u64, ShownEntry>,
+    /// The children of each element in order; under `None`, those of the root.
     orders: HashMap<Option<u64>, Vec<u64>>,
 }
 
@@ -137,19 +137,19 @@ impl Dom {
         let before = self.shown.get(&entry.id).map(|shown| &shown.entry).filter(|_| !is_new);
         write(&element, entry, before)?;
         if is_new {
-            // Another element under the old number is in the way.
+            // Remove an old element with the same id.
             if let Some(shown) = self.shown.remove(&entry.id) {
                 shown.element.remove();
             }
             self.orders.remove(&entry.parent);
-            // The children go with that element and are appended again.
+            // The children were removed with that element and are appended again.
             self.orders.remove(&Some(entry.id));
         }
-        self.shown.insert(entry.id, Shown { element, entry: entry.clone() });
+        self.shown.insert(entry.id, ShownEntry { element, entry: entry.clone() });
         Ok(())
     }
 
-    /// Tells whoever has the document's keyboard which element that means.
+    /// Sets `aria-activedescendant` of the document's active element to the focused node.
     fn point_at(&self, focus: u64) -> Result<(), JsValue> {
         let Some(active) = self.document.active_element() else { return Ok(()) };
         if self.root.contains(Some(&active)) {
@@ -167,7 +167,7 @@ fn make(document: &Document, entry: &Entry) -> Result<Element, JsValue> {
     let element = document.create_element(name)?;
     element.set_id(&format!("node-{}", entry.id));
     element.set_attribute(NUMBER, &entry.id.to_string())?;
-    // Tab belongs to egui, which knows the order; a screen reader reaches the elements by itself.
+    // Tab is handled by egui, which has the focus order; screen readers reach the elements without it.
     element.set_attribute("tabindex", "-1")?;
     if let Some(kind) = kind {
         element.set_attribute("type", kind)?;
@@ -175,7 +175,7 @@ fn make(document: &Document, entry: &Entry) -> Result<Element, JsValue> {
     Ok(element)
 }
 
-/// Writes what differs from `before`.
+/// Writes the properties that differ from `before`.
 fn write(element: &Element, entry: &Entry, before: Option<&Entry>) -> Result<(), JsValue> {
     let is_native = matches!(entry.tag, Tag::TextField | Tag::TextArea | Tag::Range);
     if before.is_none_or(|before| before.role != entry.role) && !entry.role.is_empty() && !is_native {
@@ -203,7 +203,8 @@ fn write(element: &Element, entry: &Entry, before: Option<&Entry>) -> Result<(),
     Ok(())
 }
 
-/// Puts an element over what it mirrors, property by property: an attribute `style` is forbidden to the page.
+/// Places an element over the widget that it mirrors. Properties are set one by one, because the page's security policy
+/// forbids `style` attributes.
 fn place(element: &Element, rect: [f32; 4]) -> Result<(), JsValue> {
     let Some(element) = element.dyn_ref::<HtmlElement>() else { return Ok(()) };
     for (name, value) in ["left", "top", "width", "height"].into_iter().zip(rect) {
@@ -225,7 +226,7 @@ fn write_value(element: &Element, entry: &Entry) -> Result<(), JsValue> {
     Ok(())
 }
 
-/// Listens on the root for all elements; the page is woken by every event.
+/// Registers a listener on the root for the events of all elements; every event wakes the page.
 fn listen(
     root: &Element,
     kind: &str,
@@ -238,7 +239,7 @@ fn listen(
         context.request_repaint();
     });
     root.add_event_listener_with_callback(kind, closure.as_ref().unchecked_ref())?;
-    // It listens as long as the page lives.
+    // The listener lives as long as the page.
     closure.forget();
     Ok(())
 }
@@ -277,14 +278,14 @@ fn typed(event: &web_sys::Event) {
         || element.get_attribute("role").as_deref() == Some("spinbutton");
     let data = match text.trim().parse::<f64>() {
         Ok(number) if is_number => ActionData::NumericValue(number),
-        // A number that is being typed is no number yet.
+        // An incomplete number is ignored until it parses.
         Err(_) if is_number => return,
         _ => ActionData::Value(text.into_boxed_str()),
     };
     ask(node, Action::SetValue, Some(data));
 }
 
-/// What ends typing goes to egui, which knows what it means there.
+/// Passes keys that end text entry to egui, which handles them.
 fn pressed(event: &web_sys::Event) {
     let Some(pressed) = event.dyn_ref::<KeyboardEvent>() else { return };
     let key = match pressed.key().as_str() {

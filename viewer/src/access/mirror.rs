@@ -1,10 +1,10 @@
-//! The plugin of egui that hands the tree of each frame to the document, and the document's requests to egui.
+//! The egui plugin that passes the tree of each frame to the document, and the document's requests to egui.
 
 use egui::{Context, FullOutput, Plugin, RawInput};
 
 use crate::access::{dom, outline};
 
-/// Keeps the document's elements in step with what egui shows.
+/// Synchronises the document's elements with egui's widgets.
 #[derive(Default)]
 pub(crate) struct Mirror;
 

@@ -1,10 +1,9 @@
-//! The page for those who do not see it: egui's accessibility tree as elements of the document.
+//! The page for users of screen readers: egui's accessibility tree as DOM elements.
 //!
-//! egui paints on a canvas, of which a screen reader knows nothing, and eframe hands AccessKit's tree to nobody in
-//! the browser. So the tree of every frame becomes an *outline* (roles, names, values and places, in reading
-//! order), and the outline becomes elements that lie invisibly over the canvas. What a person does to an element
-//! goes back as a request of AccessKit, which egui's widgets understand. Tests in a browser find controls there by
-//! role and name, as a screen reader does.
+//! egui paints on a canvas, which is opaque to a screen reader, and eframe does not pass AccessKit's tree on in the
+//! browser. Therefore the tree of every frame is converted to an *outline* (roles, names, values and rectangles, in reading
+//! order), and the outline to invisible elements above the canvas. A user action on an element is returned as an AccessKit
+//! request, which egui's widgets handle. Browser tests find controls by role and name, as a screen reader does.
 //!
 //! ```text
 //! egui ──TreeUpdate──► outline ──Entry──► dom ──► elements ──click, input──► ActionRequest ──► egui

@@ -1,32 +1,32 @@
 //! AccessKit's tree as a flat list of elements with ARIA roles, in reading order.
 //!
-//! Most nodes of egui's tree are nameless boxes that only group; they are left out, and what is in them belongs to
-//! the nearest box with a meaning. A text is an element without a role whose contents are the words.
+//! Most nodes of egui's tree are unnamed containers that only group. They are omitted, and their contents belong to the
+//! nearest container with a meaning. A text becomes an element without a role whose content is the text.
 
 use std::collections::HashMap;
 
 use egui::accesskit::{Action, Node, NodeId, Role, Toggled, TreeUpdate};
 
-/// Longer texts are cut: an element is for finding and hearing, not for reading a file.
+/// Maximum length of a text, characters; longer texts are cut.
 const LONGEST: usize = 2_000;
 
-/// Which element of HTML an entry becomes.
+/// The HTML element of an entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Tag {
-    /// A box or a control that the page draws itself.
+    /// A container, or a control that the page draws itself.
     Plain,
-    /// A field for a line of text.
+    /// A single-line text field.
     TextField,
-    /// A field for several lines.
+    /// A multi-line text field.
     TextArea,
-    /// A field for a number.
+    /// A number field.
     NumberField,
     /// A slider.
     Range,
 }
 
 impl Tag {
-    /// The name of the element, and the kind of input where it is one.
+    /// The element's name, and its input type if it is an `input`.
     #[cfg(target_arch = "wasm32")]
     pub(crate) const fn element(self) -> (&'static str, Option<&'static str>) {
         match self {
@@ -41,31 +41,31 @@ impl Tag {
 /// An element of the mirror.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Entry {
-    /// AccessKit's number of the node.
+    /// AccessKit's id of the node.
     pub id: u64,
-    /// The entry in which it lies; none for what lies in the page itself.
+    /// The entry that contains it; `None` at the top level of the page.
     pub parent: Option<u64>,
-    /// The element.
+    /// The HTML element.
     pub tag: Tag,
     /// The ARIA role; empty for a text.
     pub role: &'static str,
     /// The accessible name.
     pub name: String,
-    /// The words of a text, or the value of a field.
+    /// The content of a text, or the value of a field.
     pub value: String,
-    /// Place on the page: left, top, width, height, CSS px.
+    /// Rectangle on the page: left, top, width, height, CSS px.
     pub rect: [f32; 4],
-    /// States and limits, as ARIA and HTML name them.
+    /// States and limits as ARIA and HTML attributes: name and value.
     pub attributes: Vec<(&'static str, String)>,
-    /// Whether a person can act on it.
+    /// Whether a user can act on it.
     pub is_control: bool,
 }
 
 impl Entry {
-    /// Whether the element of `before`, an entry with the same number, can show this one.
+    /// Whether the element of `before`, an entry with the same id, can be reused for this one.
     ///
-    /// egui numbers widgets by their order, so a label may get the number of a button. A role or a name that the entry
-    /// lacks would stay on the element.
+    /// egui derives widget ids from their order, so that a label may get the id of a button. A role or a name that this
+    /// entry lacks would remain on the element.
     pub(crate) fn fits_element_of(&self, before: &Self) -> bool {
         let kind = |entry: &Self| (entry.tag, entry.role, entry.name.is_empty());
         kind(self) == kind(before)
@@ -95,12 +95,12 @@ impl Walk<'_> {
     fn visit(&self, id: NodeId, parent: Option<u64>, out: &mut Vec<Entry>) {
         let Some(node) = self.nodes.get(&id).filter(|node| !node.is_hidden()) else { return };
         let entry = self.entry(id, node, parent);
-        // The words of a text lie again in runs below it.
+        // The text of a label is repeated in text runs below it.
         if node.role() == Role::Label {
             out.extend(entry);
             return;
         }
-        // A field of HTML has nothing in it: a list that opens below a field comes behind it.
+        // HTML fields have no children: a list that opens below a field becomes its next sibling.
         let inner = entry.as_ref().filter(|entry| entry.tag == Tag::Plain).map(|entry| entry.id).or(parent);
         out.extend(entry);
         for child in node.children() {
@@ -108,9 +108,9 @@ impl Walk<'_> {
         }
     }
 
-    /// The entry of a node; none for a box without meaning and for a text without words.
+    /// The entry of a node; `None` for a container without a meaning and for an empty text.
     fn entry(&self, id: NodeId, node: &Node, parent: Option<u64>) -> Option<Entry> {
-        // The words of a text are its value; a name would be spoken in their place.
+        // The content of a text is its value; a name would be spoken instead.
         let name = if node.role() == Role::Label { String::new() } else { self.name(node) };
         let is_control = node.supports_action(Action::Click) || node.supports_action(Action::SetValue);
         let (tag, role) = element(node.role(), !name.is_empty(), is_control)?;
@@ -125,7 +125,7 @@ impl Walk<'_> {
         Some(Entry { id: id.0, parent, tag, role, name, value, rect, attributes, is_control })
     }
 
-    /// The label, or the words of what labels it, or its placeholder.
+    /// The accessible name: the label, otherwise the text of the labelling nodes, otherwise the placeholder or description.
     fn name(&self, node: &Node) -> String {
         if let Some(label) = node.label() {
             return cut(label);
@@ -138,7 +138,7 @@ impl Walk<'_> {
     }
 }
 
-/// The element and role of a node; none for a box that only groups.
+/// The element and role of a node; `None` for a container that only groups.
 fn element(role: Role, is_named: bool, is_control: bool) -> Option<(Tag, &'static str)> {
     let plain = |role| Some((Tag::Plain, role));
     match role {
@@ -179,14 +179,14 @@ fn element(role: Role, is_named: bool, is_control: bool) -> Option<(Tag, &'stati
         Role::TextInput | Role::SearchInput => Some((Tag::TextField, "textbox")),
         Role::MultilineTextInput => Some((Tag::TextArea, "textbox")),
         Role::TextRun => None,
-        // What can be clicked and has a name is a button, whatever draws it.
+        // A named node that can be clicked is a button.
         _ if is_named && is_control => plain("button"),
         _ if is_named => plain("group"),
         _ => None,
     }
 }
 
-/// The words of a text, or what a field holds.
+/// The content of a text, or the value of a field.
 fn value(node: &Node, tag: Tag) -> String {
     let number = || node.numeric_value().map(|value| format!("{value}"));
     match tag {
@@ -197,7 +197,7 @@ fn value(node: &Node, tag: Tag) -> String {
     }
 }
 
-/// States and limits of a node.
+/// The states and limits of a node.
 fn attributes(node: &Node, role: &str) -> Vec<(&'static str, String)> {
     let mut all = Vec::new();
     if let Some(toggled) = node.toggled() {
@@ -239,7 +239,7 @@ fn attributes(node: &Node, role: &str) -> Vec<(&'static str, String)> {
             all.push((aria, number.to_string()));
         }
     }
-    // HTML rounds a slider's value to a step of 1 unless it is told otherwise.
+    // HTML rounds a slider's value to multiples of 1 unless a step is given.
     if is_range && !all.iter().any(|(name, _)| *name == "step") {
         all.push(("step", "any".to_owned()));
     }
@@ -312,7 +312,7 @@ mod tests {
     }
 
     #[test]
-    fn what_opens_below_a_field_comes_behind_it() {
+    fn suggestions_follow_their_field() {
         let mut region = node(Role::Region, &[2]);
         region.set_label("Breakpoints");
         let mut field = node(Role::TextInput, &[3, 4]);
@@ -330,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_pressed_checked_or_selected_is_said_in_the_words_of_the_role() {
+    fn toggled_controls_have_the_aria_state_of_their_role() {
         for (role, state) in
             [(Role::Button, "aria-pressed"), (Role::CheckBox, "aria-checked"), (Role::Tab, "aria-selected")]
         {

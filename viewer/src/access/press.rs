@@ -1,11 +1,11 @@
-//! How long a press may last and still be a click.
+//! Maximum duration of a click.
 //!
-//! egui counts a press of more than 0.8 s as none. A mouse needs no such limit: a slow machine paints late, so that a short press
-//! seems long, and some hands are slow. On a touch screen a long press is the secondary click, which opens menus.
+//! egui does not count a press of more than 0.8 s as a click. A mouse needs no such limit: on a slow machine a short press
+//! appears long, and some users press slowly. On a touch screen a long press is the secondary click, which opens menus.
 
 use egui::{Context, InputOptions};
 
-/// Sets the limit for the pointer that is in use.
+/// Sets the maximum duration for the pointer in use.
 pub(crate) fn limit(context: &Context) {
     let is_touched = context.input(egui::InputState::any_touches);
     let longest_s = if is_touched { InputOptions::default().max_click_duration } else { f64::INFINITY };
@@ -18,7 +18,7 @@ mod tests {
 
     use super::*;
 
-    /// Whether a button was clicked by a press of 2 s.
+    /// Whether a press of 2 s clicks a button.
     fn is_click(touches: bool) -> bool {
         let context = Context::default();
         let mut is_clicked = false;

@@ -1,4 +1,4 @@
-//! Plots expressions over the steps and reads their values from the server.
+//! Adds derived columns to the plots and reads their values from the server.
 
 use sightline_session::expression::Expression;
 use sightline_session::query::{Query, QueryAnswer};
@@ -6,10 +6,10 @@ use sightline_session::query::{Query, QueryAnswer};
 use crate::breakpoints::derived::Derived;
 use crate::state::State;
 
-/// How many derived columns there may be: each is a plot of its own.
+/// Maximum number of derived columns; each is a separate plot.
 const LIMIT: usize = 8;
 
-/// The values of a growing run are read again when it has grown by 1/50: reading every new step would be quadratic.
+/// The values of a growing run are read again after a growth of 1/50: reading them at every step would take quadratic time.
 const GROWTH: usize = 50;
 
 impl State {
@@ -19,14 +19,14 @@ impl State {
             self.messages.problem(format!("`{text}` cannot be plotted: {refused}."), refused.hint);
             return;
         }
-        if self.ask.derived.iter().any(|derived| derived.expression == text) {
+        if self.breakpoints.derived.iter().any(|derived| derived.expression == text) {
             self.messages.note(format!("`{text}` is plotted already."));
-        } else if self.ask.derived.len() >= LIMIT {
+        } else if self.breakpoints.derived.len() >= LIMIT {
             let hint = "Remove one in the panel Breakpoints.".to_owned();
             self.messages.problem(format!("There are {LIMIT} derived plots already."), Some(hint));
         } else {
             self.messages.note(format!("`{text}` is plotted over the steps."));
-            self.ask.derived.push(Derived::new(text));
+            self.breakpoints.derived.push(Derived::new(text));
         }
     }
 
@@ -35,15 +35,15 @@ impl State {
         let (number, steps) = (target.number, target.runs.iter().map(|run| run.rows.len()).sum::<usize>());
         let grows = self.progress.keys().any(|(target, _)| *target == number);
         let mut queries = Vec::new();
-        for derived in self.ask.derived.iter_mut().filter(|derived| !derived.is_asked) {
-            let enough = match derived.asked_for {
+        for derived in self.breakpoints.derived.iter_mut().filter(|derived| !derived.is_pending) {
+            let enough = match derived.requested_rows {
                 Some((target, before)) if target == number => {
                     derived.is_stale && steps != before && (!grows || steps >= before + before / GROWTH)
                 }
                 _ => true,
             };
             if enough {
-                (derived.asked_for, derived.is_asked, derived.is_stale) =
+                (derived.requested_rows, derived.is_pending, derived.is_stale) =
                     (Some((number, steps)), true, false);
                 let query =
                     Query { expression: derived.expression.clone(), target: Some(number), values: true };
@@ -55,10 +55,10 @@ impl State {
         }
     }
 
-    pub(super) fn took_column(&mut self, expression: &str, outcome: Result<QueryAnswer, String>) {
-        let asked = self.ask.derived.iter_mut().find(|derived| derived.expression == expression);
-        let Some(derived) = asked else { return };
-        derived.is_asked = false;
+    pub(super) fn on_column_reply(&mut self, expression: &str, outcome: Result<QueryAnswer, String>) {
+        let found = self.breakpoints.derived.iter_mut().find(|derived| derived.expression == expression);
+        let Some(derived) = found else { return };
+        derived.is_pending = false;
         match outcome {
             Ok(answer) => (derived.answer, derived.problem) = (Some(answer), None),
             Err(problem) => derived.problem = Some(problem),

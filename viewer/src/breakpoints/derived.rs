@@ -1,25 +1,32 @@
-//! Derived columns: expressions over the steps of the target that is looked at, asked again while its runs grow.
+//! Derived columns: expressions over the steps of the selected target, read again while its runs grow.
 
 use sightline_session::query::QueryAnswer;
 
-/// An expression that is plotted.
+/// A plotted expression.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Derived {
     /// The expression.
     pub expression: String,
-    /// What it is at every step, as last heard.
+    /// The last received values at every step.
     pub answer: Option<QueryAnswer>,
-    /// What the server said instead.
+    /// The server's explanation, if it refused the expression.
     pub problem: Option<String>,
-    /// The target for which it was asked, and how many steps its runs had.
-    pub(super) asked_for: Option<(usize, usize)>,
-    pub(super) is_asked: bool,
+    /// The target of the last request, and how many steps its runs had.
+    pub(super) requested_rows: Option<(usize, usize)>,
+    pub(super) is_pending: bool,
     pub(super) is_stale: bool,
 }
 
 impl Derived {
     pub(crate) fn new(expression: String) -> Self {
-        Self { expression, answer: None, problem: None, asked_for: None, is_asked: false, is_stale: true }
+        Self {
+            expression,
+            answer: None,
+            problem: None,
+            requested_rows: None,
+            is_pending: false,
+            is_stale: true,
+        }
     }
 
     pub(crate) fn make_stale(&mut self) {

@@ -1,20 +1,20 @@
-//! A derived column over the steps: any expression, plotted without computing the run again.
+//! Plots a derived column over the steps; any expression, without recomputing the run.
 
 use egui::{RichText, Ui, vec2};
 use egui_plot::{HoverPosition, Line, Plot, PlotPoint, Points};
 use sightline_session::query::RunAnswer;
 
-use crate::breakpoints::Ask;
+use crate::breakpoints::BreakpointCommand;
 use crate::breakpoints::derived::Derived;
 use crate::command::{Command, Go};
 use crate::drawing::decimate;
-use crate::panels::chart::{over_steps, pieces, step_of};
+use crate::panels::chart::{over_steps, polylines, step_of};
 use crate::panels::digits;
 use crate::panels::step_marks::{cursors, point};
 use crate::state::State;
 use crate::theme;
 
-/// The most points that are drawn of a line: what a wide screen can tell apart, twice.
+/// Maximum number of points of a line: about two per pixel column of a wide screen.
 const POINTS: usize = 4000;
 
 /// Shows one derived column: a row with its name, value and remove button, and its plot.
@@ -26,7 +26,7 @@ pub(crate) fn show(
     is_last: bool,
     out: &mut Vec<Command>,
 ) {
-    let Some(derived) = state.ask.derived.get(at) else { return };
+    let Some(derived) = state.breakpoints.derived.get(at) else { return };
     let of_run = run_answer(state, derived);
     title(ui, state, derived, of_run, at, out);
     let last = state.stop_count().saturating_sub(1) as f64;
@@ -44,9 +44,9 @@ pub(crate) fn show(
         });
     let response = plot.show(ui, |plot| {
         cursors(plot, state);
-        for piece in of_run.map(points).unwrap_or_default() {
-            plot.line(Line::new("", piece.clone()).color(colour).width(1.5).allow_hover(false));
-            plot.points(Points::new("", decimate::marks(piece)).color(colour).radius(2.5));
+        for polyline in of_run.map(points).unwrap_or_default() {
+            plot.line(Line::new("", polyline.clone()).color(colour).width(1.5).allow_hover(false));
+            plot.points(Points::new("", decimate::marks(polyline)).color(colour).radius(2.5));
         }
         plot.pointer_coordinate()
     });
@@ -71,7 +71,7 @@ fn title(
     out: &mut Vec<Command>,
 ) {
     ui.horizontal(|ui| {
-        ui.set_height(crate::panels::names::HEIGHT);
+        ui.set_height(crate::panels::chart_legend::HEIGHT);
         let unit = derived.answer.as_ref().map_or("", |answer| answer.unit.as_str());
         let unit = if unit.is_empty() { String::new() } else { format!(", {unit}") };
         ui.label(theme::note(format!("{}{unit}", derived.expression)).color(theme::text()));
@@ -88,21 +88,21 @@ fn title(
         let remove = ui.small_button(RichText::new("x").monospace());
         let remove = remove.accessible_name(format!("remove plot {}", derived.expression));
         if remove.on_hover_text("take this plot away").clicked() {
-            out.push(Command::Ask(Ask::Unplot(at)));
+            out.push(Command::Breakpoints(BreakpointCommand::Unplot(at)));
         }
     });
 }
 
-/// The answer for the run that is looked at.
+/// The values for the selected run.
 fn run_answer<'a>(state: &State, derived: &'a Derived) -> Option<&'a RunAnswer> {
     let target = state.cursor.target?;
     let runs = &derived.answer.as_ref()?.runs;
     runs.iter().find(|answer| answer.target == target && answer.run == state.cursor.run)
 }
 
-/// What a derived column is at a step of the run that is looked at.
+/// The value of a derived column at a step of the selected run.
 pub(crate) fn value(state: &State, at: usize, step: usize) -> Option<f64> {
-    let derived = state.ask.derived.get(at)?;
+    let derived = state.breakpoints.derived.get(at)?;
     value_at(run_answer(state, derived), step)
 }
 
@@ -111,13 +111,14 @@ fn value_at(of_run: Option<&RunAnswer>, step: usize) -> Option<f64> {
     *of_run.values.get(step.checked_sub(of_run.first_step)?)?
 }
 
-/// The stretches of values; of a long run the least and the greatest of every few steps, so that no peak is lost.
+/// The line segments of the values. For a long run, each group of consecutive steps is reduced to its minimum and maximum,
+/// so that peaks remain visible.
 fn points(of_run: &RunAnswer) -> Vec<Vec<[f64; 2]>> {
     let at = |(k, value): (usize, &Option<f64>)| value.map(|value| [(of_run.first_step + k) as f64, value]);
     let all: Vec<Option<[f64; 2]>> = of_run.values.iter().enumerate().map(at).collect();
     let bundle = all.len().div_ceil(POINTS / 2).max(1);
     if bundle == 1 {
-        return pieces(&all);
+        return polylines(&all);
     }
     let ends = |few: &[Option<[f64; 2]>]| {
         let there = || few.iter().flatten().copied();
@@ -129,10 +130,10 @@ fn points(of_run: &RunAnswer) -> Vec<Vec<[f64; 2]>> {
         }
     };
     let fewer: Vec<Option<[f64; 2]>> = all.chunks(bundle).flat_map(ends).collect();
-    pieces(&fewer)
+    polylines(&fewer)
 }
 
-/// The plot as a sentence.
+/// A description of the plot.
 fn in_words(derived: &Derived, of_run: Option<&RunAnswer>, step: usize) -> String {
     let values = || of_run.into_iter().flat_map(|answer| answer.values.iter().flatten().copied());
     let unit = derived.answer.as_ref().map_or("", |answer| answer.unit.as_str());

@@ -1,19 +1,19 @@
-//! Going to exactly one step by what is typed: a number, so many steps on, a time, or the name of an event.
+//! Parses the destination of “Go to step”: a number, an offset, a time, or the name of an event.
 
 use crate::state::{State, events};
 
-/// The events that have a name, as the box lists them.
+/// The named events, in the order of the list.
 pub(crate) const EVENTS: [&str; 8] = ["lost", "failed", "tracking", "fault", "pick", "event", "hit", "worst"];
 
-/// What the box says of itself.
+/// Description of the accepted input.
 pub(crate) const FORMS: &str =
     "12, +5, -3, first, last, t=3.5, or lost, failed, tracking, fault, pick, event, hit, worst";
 
 impl State {
-    /// The step that is meant.
+    /// The step that `text` describes.
     ///
     /// # Errors
-    /// One sentence that says why there is none.
+    /// A sentence that explains why `text` describes no step.
     pub fn step_meant(&self, text: &str) -> Result<usize, String> {
         let last = self.stop_count().checked_sub(1).ok_or_else(|| self.missing_target())?;
         let text = text.trim().to_lowercase();
@@ -41,7 +41,7 @@ impl State {
         }
     }
 
-    /// The stop nearest to a time since the first one.
+    /// The stop nearest to a time after the first one, s.
     fn step_at_time(&self, text: &str) -> Result<usize, String> {
         let number = text.trim().trim_end_matches('s').trim();
         let time_s: f64 =
@@ -52,7 +52,7 @@ impl State {
         nearest.filter(|_| time_s.is_finite()).ok_or_else(|| not_a_step(text))
     }
 
-    /// The next step after the cursor's at which an event happens, or else the first of all.
+    /// The next step after the cursor at which an event occurs; if there is none, the first one at all.
     fn step_of_event(&self, word: &str) -> Result<usize, String> {
         let run = self.run().ok_or_else(|| self.missing_target())?;
         let step = self.cursor.step;

@@ -1,4 +1,4 @@
-//! Breakpoints, derived columns, and playing along the steps.
+//! Breakpoints, derived columns, and playback of the steps.
 
 pub(crate) mod panel;
 pub(crate) mod derived_plot;
@@ -17,105 +17,105 @@ use sightline_session::breakpoints::BreakpointView;
 use self::derived::Derived;
 use self::play::{Play, Shuttle};
 
-/// A command of the user.
+/// A command about breakpoints, derived columns or playback.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Ask {
+pub enum BreakpointCommand {
     /// Changes the text of the expression box.
     Type(String),
-    /// Shows the expression box and puts the cursor there.
+    /// Shows the expression box and focuses it.
     Focus,
-    /// Puts a text into the expression box, to be checked by the user before it is set.
+    /// Puts a text into the expression box, for the user to check.
     Propose(String),
-    /// Takes a breakpoint into the box, to change its condition.
+    /// Puts a breakpoint's condition into the box, to change it.
     Edit(usize),
-    /// Leaves the breakpoint that is being changed as it was.
+    /// Cancels the change of the breakpoint.
     CancelEdit,
-    /// Sets the breakpoint of the box, or changes the one that was taken into it.
+    /// Sets a breakpoint with the condition in the box, or changes the one that is being edited.
     Set,
     /// Sets a breakpoint at a stop, or removes it.
     BreakAt(usize),
-    /// Switches a breakpoint on or off.
+    /// Enables or disables a breakpoint.
     Switch {
         /// The breakpoint's number.
         number: usize,
-        /// Whether it is on.
+        /// Whether to enable it.
         on: bool,
     },
     /// Removes a breakpoint.
     Remove(usize),
     /// Plots the expression over the steps.
     Plot(String),
-    /// Takes a derived column out of the plots.
+    /// Removes a derived column from the plots.
     Unplot(usize),
     /// Goes to the next hit of any breakpoint.
     NextHit,
-    /// Goes to the previous one.
+    /// Goes to the previous hit of any breakpoint.
     PreviousHit,
-    /// Plays, stops, loops.
+    /// Controls the playback.
     Shuttle(Shuttle),
     /// Shows or hides the state bands of the other targets.
     ShowOthers(bool),
 }
 
-/// Breakpoints, derived columns, and time travel.
+/// Breakpoints, derived columns, and playback.
 #[derive(Default)]
-pub struct Asking {
-    /// The breakpoints with their hits, as last heard.
-    pub breakpoints: Vec<BreakpointView>,
+pub struct BreakpointState {
+    /// The breakpoints with their hits, as last received.
+    pub list: Vec<BreakpointView>,
     /// The text of the expression box.
     pub text: String,
-    /// The breakpoint whose condition is in the box.
+    /// Number of the breakpoint whose condition is being edited.
     pub edited: Option<usize>,
-    /// Whether the expression box is to get the keyboard.
+    /// Whether the expression box requests the focus.
     pub wants_focus: bool,
     /// The derived columns.
     pub derived: Vec<Derived>,
-    /// How time is travelled.
+    /// The state of the playback.
     pub play: Play,
     /// Whether the state bands of the other targets are shown.
     pub shows_others: bool,
     stale: bool,
-    /// The list is being read; the number of changes when it was requested.
-    asked: Option<u64>,
-    /// Number of requested changes of the list.
+    /// Value of `changes` at the pending request of the list.
+    pending_read: Option<u64>,
+    /// Number of changes of the list that were requested.
     changes: u64,
-    /// How many breakpoints are being set.
+    /// Number of breakpoints that are being set.
     adding: usize,
-    /// Conditions of breakpoints that are being set, with the changes that follow.
+    /// Conditions of breakpoints that are being set, each with the change to apply afterwards.
     pub(super) when_set: Vec<(String, WhenSet)>,
 }
 
-/// A change that follows as soon as the server has set a breakpoint and its number is known.
+/// A change to apply once the server has set a breakpoint and assigned its number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum WhenSet {
-    /// It is switched off: so it was before it was removed, or so it is in the file that lists it.
+    /// Disable it, as it was before its removal or as listed in the file.
     SwitchOff,
-    /// It is removed.
+    /// Remove it.
     Remove,
 }
 
-impl Asking {
+impl BreakpointState {
     /// Marks breakpoints and columns as stale.
     pub(crate) fn make_stale(&mut self) {
         self.stale = true;
         self.derived.iter_mut().for_each(Derived::make_stale);
     }
 
-    /// Forgets everything of another session except the user's texts.
+    /// Discards the data of the previous session, but keeps the user's texts.
     pub(crate) fn forget(&mut self) {
-        self.breakpoints.clear();
-        (self.edited, self.asked, self.adding) = (None, None, 0);
+        self.list.clear();
+        (self.edited, self.pending_read, self.adding) = (None, None, 0);
         self.when_set.clear();
         self.play.forget();
         self.derived.iter_mut().for_each(Derived::forget);
     }
 
-    /// Breakpoints that are on, each with its place in the list.
+    /// Enabled breakpoints, each with its index in the list.
     pub fn watched(&self) -> impl Iterator<Item = (usize, &BreakpointView)> {
-        self.breakpoints.iter().enumerate().filter(|(_, breakpoint)| breakpoint.on)
+        self.list.iter().enumerate().filter(|(_, breakpoint)| breakpoint.on)
     }
 
-    /// The stops that a breakpoint hit in a run, in order.
+    /// The steps at which a breakpoint hits in a run, in order.
     pub fn hits(breakpoint: &BreakpointView, target: usize, run: usize) -> &[usize] {
         let of_run = breakpoint.hits.iter().find(|hits| hits.target == target && hits.run == run);
         of_run.map_or(&[], |hits| &hits.steps)

@@ -1,39 +1,39 @@
-//! How the steps play: forwards and backwards at a rate that the person sets, within a loop.
+//! Playback of the steps: forwards or backwards at the user's rate, within a loop.
 
-/// The rates that can be set, steps a second.
+/// The allowed rates, steps/s.
 pub(crate) const RATES: std::ops::RangeInclusive<f64> = 0.5..=60.0;
 
-/// What plays, stops and loops.
+/// A command of the playback.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shuttle {
-    /// Plays forwards, or pauses what plays.
+    /// Plays forwards, or pauses.
     Toggle,
-    /// Plays backwards; again: twice as fast.
+    /// Plays backwards; repeated: twice as fast.
     Reverse,
     /// Stops.
     Stop,
-    /// Plays forwards; again: twice as fast.
+    /// Plays forwards; repeated: twice as fast.
     Forward,
-    /// Steps a second at single speed.
+    /// Sets the rate at single speed, steps/s.
     Rate(f64),
-    /// The loop begins at this step.
+    /// Starts the loop at the cursor's step.
     LoopIn,
-    /// The loop ends at this step.
+    /// Ends the loop at the cursor's step.
     LoopOut,
-    /// There is no loop any more.
+    /// Removes the loop.
     ClearLoop,
 }
 
-/// How time is travelled.
+/// The state of the playback.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Play {
-    /// How many times the rate, and in which direction; 0 while it is paused.
+    /// Multiple of the rate, negative for backwards; 0 while paused.
     pub speed: i32,
-    /// Steps a second at single speed.
+    /// Rate at single speed, steps/s.
     pub rate: f64,
-    /// The first step of the loop.
+    /// First step of the loop; `None`: the first stop.
     pub loop_in: Option<usize>,
-    /// The last step of the loop.
+    /// Last step of the loop; `None`: the last computed step.
     pub loop_out: Option<usize>,
     pub(super) due_s: Option<f64>,
     pub(super) waits_since_s: Option<f64>,
@@ -46,17 +46,17 @@ impl Default for Play {
 }
 
 impl Play {
-    /// Whether it plays.
+    /// Whether it is not paused.
     pub fn is_playing(&self) -> bool {
         self.speed != 0
     }
 
-    /// When the next step is due, s; none while it is paused.
+    /// Time of the next step, s; `None` while paused.
     pub(crate) fn due_s(&self) -> Option<f64> {
         self.due_s.filter(|_| self.is_playing())
     }
 
-    /// How it plays, in words.
+    /// The state as words.
     pub fn in_words(&self) -> String {
         match self.speed {
             0 => "paused".to_owned(),
@@ -67,7 +67,7 @@ impl Play {
         }
     }
 
-    /// Paused and without a loop, at the rate that was set.
+    /// Resets everything except the rate.
     pub(crate) fn forget(&mut self) {
         *self = Self { rate: self.rate, ..Self::default() };
     }

@@ -1,28 +1,28 @@
-//! Lets time pass: plays the steps until the end of the drive, or until a breakpoint hits.
+//! Playback: advances the cursor until the end of the drive, or until a breakpoint hits.
 //!
-//! Nothing plays by itself. The clock comes in with every frame; a step that is still being loaded is waited for, a
-//! little, while it plays at single speed, so that what was asked for is seen.
+//! The clock is passed in with every frame; nothing runs in the background. At single speed, playback waits briefly for a
+//! step that is being loaded, so that it is shown.
 
 use crate::breakpoints::play::{RATES, Shuttle};
 use crate::cache::Slot;
 use crate::state::State;
 
-/// The fastest that repeated presses lead to.
+/// Maximum speed of repeated presses, as a multiple of the rate.
 const FASTEST: i32 = 64;
-/// How long a step that is being loaded is waited for, s.
+/// Maximum time to wait for a step that is being loaded, s.
 const PATIENCE_S: f64 = 1.0;
-/// How often it is looked for meanwhile, s.
+/// Interval between checks whether the step has been loaded, s.
 const GLANCE_S: f64 = 0.03;
-/// Steps that are made up for in one frame; what is later than that is let go.
+/// Maximum number of overdue steps per frame; further ones are dropped.
 const AT_ONCE: usize = 64;
 
 impl State {
     pub(crate) fn shuttle(&mut self, shuttle: Shuttle) {
         let step = self.cursor.step;
-        let play = &mut self.ask.play;
+        let play = &mut self.breakpoints.play;
         match shuttle {
             Shuttle::Toggle if play.is_playing() => play.stop(),
-            Shuttle::Toggle => self.begin_to_play(),
+            Shuttle::Toggle => self.start_playing(),
             Shuttle::Stop => play.stop(),
             Shuttle::Forward if play.speed > 0 => play.speed = (play.speed * 2).min(FASTEST),
             Shuttle::Forward => play.speed = 1,
@@ -40,39 +40,39 @@ impl State {
             }
             Shuttle::ClearLoop => (play.loop_in, play.loop_out) = (None, None),
         }
-        // A new speed counts from now on.
-        self.ask.play.due_s = None;
+        // The new speed applies from the next tick.
+        self.breakpoints.play.due_s = None;
     }
 
-    /// Plays; at the end of the drive from its beginning.
-    fn begin_to_play(&mut self) {
+    /// Starts playing; at the end of the drive, from its beginning.
+    fn start_playing(&mut self) {
         let (first, last) = self.range();
         if self.cursor.step >= last && !self.is_looping() {
             self.cursor.step = first;
         }
-        self.ask.play.speed = 1;
+        self.breakpoints.play.speed = 1;
     }
 
     fn is_looping(&self) -> bool {
-        self.ask.play.loop_in.is_some() || self.ask.play.loop_out.is_some()
+        self.breakpoints.play.loop_in.is_some() || self.breakpoints.play.loop_out.is_some()
     }
 
-    /// The first and the last step that are played: the loop's, or the drive's as far as the run has come.
+    /// The first and the last step to play: those of the loop, otherwise from the first stop to the last computed step.
     fn range(&self) -> (usize, usize) {
         let last = self.stop_count().saturating_sub(1);
         let computed = self.run().and_then(|run| run.rows.last()).map(|row| row.step);
         let end = computed.filter(|step| *step >= self.cursor.step).unwrap_or(last);
-        let play = &self.ask.play;
+        let play = &self.breakpoints.play;
         (play.loop_in.unwrap_or(0).min(last), play.loop_out.unwrap_or(end).min(last))
     }
 
-    /// Lets the time pass until `now_s`. Returns when the next step is due.
+    /// Advances the playback to `now_s`. Returns the time of the next step, s; `None` while paused.
     pub fn tick(&mut self, now_s: f64) -> Option<f64> {
-        if !self.ask.play.is_playing() {
+        if !self.breakpoints.play.is_playing() {
             return None;
         }
-        let period_s = 1.0 / (self.ask.play.rate * f64::from(self.ask.play.speed.abs()));
-        let mut due_s = self.ask.play.due_s.unwrap_or(now_s + period_s);
+        let period_s = 1.0 / (self.breakpoints.play.rate * f64::from(self.breakpoints.play.speed.abs()));
+        let mut due_s = self.breakpoints.play.due_s.unwrap_or(now_s + period_s);
         for _ in 0..AT_ONCE {
             if due_s > now_s {
                 break;
@@ -82,22 +82,22 @@ impl State {
                 break;
             }
             self.play_step();
-            if !self.ask.play.is_playing() {
+            if !self.breakpoints.play.is_playing() {
                 return None;
             }
             due_s += period_s;
         }
         due_s = due_s.max(now_s);
-        self.ask.play.due_s = Some(due_s);
+        self.breakpoints.play.due_s = Some(due_s);
         Some(due_s)
     }
 
-    /// Whether the step that is shown is not loaded yet and worth waiting for.
+    /// Whether playback waits for the cursor's step, which is being loaded.
     fn waits_for_step(&mut self, now_s: f64) -> bool {
         let is_loading = self.row().is_some()
             && matches!(self.trace_at(self.cursor.step), Slot::Absent | Slot::Loading)
-            && self.ask.play.speed.abs() == 1;
-        let play = &mut self.ask.play;
+            && self.breakpoints.play.speed.abs() == 1;
+        let play = &mut self.breakpoints.play;
         if !is_loading {
             play.waits_since_s = None;
             return false;
@@ -110,14 +110,14 @@ impl State {
         waits
     }
 
-    /// One step in the direction of play.
+    /// Advances by one step in the direction of play.
     fn play_step(&mut self) {
         let (first, last) = self.range();
-        let (step, is_forward) = (self.cursor.step, self.ask.play.speed > 0);
+        let (step, is_forward) = (self.cursor.step, self.breakpoints.play.speed > 0);
         let at_end = if is_forward { step >= last } else { step <= first };
         let next = match (at_end, is_forward) {
             (true, _) if !self.is_looping() || first == last => {
-                self.ask.play.stop();
+                self.breakpoints.play.stop();
                 return;
             }
             (true, true) => first,
@@ -130,7 +130,7 @@ impl State {
         let hits = target.map(|target| self.hit_at(target, self.cursor.run, next)).unwrap_or_default();
         let hit = hits.join("`, `");
         if !hit.is_empty() {
-            self.ask.play.stop();
+            self.breakpoints.play.stop();
             self.messages.note(format!("Stopped at step {next}: `{hit}`."));
         }
     }

@@ -1,62 +1,62 @@
-//! Removing breakpoints and derived plots, and setting them again.
+//! Removes breakpoints and derived plots, and restores them.
 
 use sightline_session::breakpoints::{BreakpointChange, BreakpointView, NewBreakpoint};
 
 use crate::breakpoints::WhenSet;
 use crate::breakpoints::derived::Derived;
 use crate::state::State;
-use crate::state::deeds::Deed;
+use crate::state::undoable::UndoableChange;
 
 impl State {
     /// Removes a breakpoint from the list and from the server; `None` without such a breakpoint or without a session.
-    pub(crate) fn take_breakpoint_out(&mut self, number: usize) -> Option<BreakpointView> {
-        let at = self.ask.breakpoints.iter().position(|breakpoint| breakpoint.number == number)?;
+    pub(crate) fn remove_from_list(&mut self, number: usize) -> Option<BreakpointView> {
+        let at = self.breakpoints.list.iter().position(|breakpoint| breakpoint.number == number)?;
         if !self.drop_breakpoint(number) {
             return None;
         }
-        if self.ask.edited == Some(number) {
-            self.ask.edited = None;
+        if self.breakpoints.edited == Some(number) {
+            self.breakpoints.edited = None;
         }
-        Some(self.ask.breakpoints.remove(at))
+        Some(self.breakpoints.list.remove(at))
     }
 
-    /// Removes the breakpoint with a condition again; it may have another number by now, or none yet.
-    pub(crate) fn unset(&mut self, expression: &str) {
-        let found = self.ask.breakpoints.iter().find(|known| known.expression == expression);
+    /// Removes the breakpoint with a condition; its number may have changed, or may not be known yet.
+    pub(crate) fn remove_by_condition(&mut self, expression: &str) {
+        let found = self.breakpoints.list.iter().find(|known| known.expression == expression);
         match found.map(|known| known.number) {
             Some(number) => {
-                self.take_breakpoint_out(number);
+                self.remove_from_list(number);
             }
-            None if self.ask.adding > 0 => {
-                self.ask.when_set.push((expression.to_owned(), WhenSet::Remove));
+            None if self.breakpoints.adding > 0 => {
+                self.breakpoints.when_set.push((expression.to_owned(), WhenSet::Remove));
             }
             None => {}
         }
     }
 
-    /// Sets a breakpoint that was removed, or that a file lists, as it was.
-    pub(crate) fn set_again(&mut self, expression: &str, is_on: bool) {
-        self.ask.when_set.retain(|(waiting, _)| waiting != expression);
+    /// Sets a breakpoint that was removed, or that a file lists, with its former state.
+    pub(crate) fn restore_breakpoint(&mut self, expression: &str, is_on: bool) {
+        self.breakpoints.when_set.retain(|(waiting, _)| waiting != expression);
         if !is_on {
-            self.ask.when_set.push((expression.to_owned(), WhenSet::SwitchOff));
+            self.breakpoints.when_set.push((expression.to_owned(), WhenSet::SwitchOff));
         }
         self.add_breakpoint(NewBreakpoint { expression: Some(expression.to_owned()), step: None });
     }
 
-    /// Takes out the changes that wait until a breakpoint is set: it is set now, or was refused.
+    /// Removes and returns the changes that waited for a breakpoint: it was set, or refused.
     pub(super) fn take_when_set(&mut self, expression: Option<&str>) -> Vec<WhenSet> {
-        self.ask.adding = self.ask.adding.saturating_sub(1);
+        self.breakpoints.adding = self.breakpoints.adding.saturating_sub(1);
         let is_meant = |waiting: &mut (String, WhenSet)| Some(waiting.0.as_str()) == expression;
-        self.ask.when_set.extract_if(.., is_meant).map(|(_, what)| what).collect()
+        self.breakpoints.when_set.extract_if(.., is_meant).map(|(_, what)| what).collect()
     }
 
-    /// Applies the changes that waited until a breakpoint is set; returns whether it is removed.
+    /// Applies the changes that waited for a breakpoint; returns whether it was removed.
     pub(super) fn change_when_set(&mut self, view: &BreakpointView) -> bool {
         let number = view.number;
         let waiting = self.take_when_set(Some(&view.expression));
         let is_removed = waiting.contains(&WhenSet::Remove);
         if is_removed {
-            self.ask.breakpoints.retain(|known| known.number != number);
+            self.breakpoints.list.retain(|known| known.number != number);
             self.drop_breakpoint(number);
         } else if waiting.contains(&WhenSet::SwitchOff) {
             self.change_breakpoint(number, &BreakpointChange { on: Some(false), expression: None });
@@ -65,23 +65,23 @@ impl State {
     }
 
     pub(crate) fn unplot(&mut self, place: usize) {
-        if place < self.ask.derived.len() {
-            let expression = self.ask.derived.remove(place).expression;
+        if place < self.breakpoints.derived.len() {
+            let expression = self.breakpoints.derived.remove(place).expression;
             let what = format!("the plot `{expression}`");
-            self.did_remove(&what, Deed::RemovedPlot { expression, place });
+            self.record_removal(&what, UndoableChange::RemovedPlot { expression, place });
         }
     }
 
-    /// Removes the plot of an expression again.
-    pub(crate) fn take_plot_out(&mut self, expression: &str) {
-        self.ask.derived.retain(|derived| derived.expression != expression);
+    /// Removes the plot of an expression.
+    pub(crate) fn remove_plot(&mut self, expression: &str) {
+        self.breakpoints.derived.retain(|derived| derived.expression != expression);
     }
 
-    /// Plots an expression again at its place and reads its values again.
-    pub(crate) fn plot_again(&mut self, expression: &str, place: usize) {
-        if self.ask.derived.iter().all(|derived| derived.expression != expression) {
-            let place = place.min(self.ask.derived.len());
-            self.ask.derived.insert(place, Derived::new(expression.to_owned()));
+    /// Restores the plot of an expression at its index and reads its values again.
+    pub(crate) fn restore_plot(&mut self, expression: &str, place: usize) {
+        if self.breakpoints.derived.iter().all(|derived| derived.expression != expression) {
+            let place = place.min(self.breakpoints.derived.len());
+            self.breakpoints.derived.insert(place, Derived::new(expression.to_owned()));
         }
     }
 }

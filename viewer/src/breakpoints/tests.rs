@@ -1,4 +1,4 @@
-//! Breakpoints, the expression box, derived plots and going to a step: what is shown, said and asked.
+//! Breakpoints, the expression box, derived plots, and going to a step: display, messages and requests.
 
 use egui_kittest::kittest::Queryable;
 use sightline_api::endpoint::Call;
@@ -11,7 +11,7 @@ use sightline_session::breakpoints::{Breakpoint, BreakpointView, NewBreakpoint, 
 use sightline_session::expression::Answers;
 use sightline_session::query::{Query, QueryAnswer, RunAnswer};
 
-use crate::breakpoints::Ask;
+use crate::breakpoints::BreakpointCommand;
 use crate::command::help;
 use crate::command::{Command, Go};
 use crate::panels::pane::Pane;
@@ -36,7 +36,7 @@ pub(crate) fn breakpoint(number: usize, expression: &str, steps: &[usize]) -> Br
 /// The fixed drive with two breakpoints.
 fn watched(context: &egui::Context, step: usize) -> State {
     let mut state = fixture::at_step(context, step);
-    state.ask.breakpoints = vec![breakpoint(0, "ncc < 0.6", &[3, 4]), breakpoint(3, "step == 2", &[2])];
+    state.breakpoints.list = vec![breakpoint(0, "ncc < 0.6", &[3, 4]), breakpoint(3, "step == 2", &[2])];
     state
 }
 
@@ -47,8 +47,8 @@ fn loaded(step: usize) -> State {
 }
 
 /// The calls about breakpoints and columns that follow a command.
-fn ask(state: &mut State, ask: Ask) -> Vec<Call> {
-    state.perform(Command::Ask(ask));
+fn calls_after(state: &mut State, command: BreakpointCommand) -> Vec<Call> {
+    state.perform(Command::Breakpoints(command));
     let is_ours = |call: &Call| call.endpoint.contains("breakpoint") || call.is_to::<QuerySession>();
     calls(state).into_iter().filter(is_ours).collect()
 }
@@ -58,7 +58,7 @@ fn add(expression: Option<String>, step: Option<usize>) -> Call {
     Call::with_body::<AddBreakpoint>(&at_session(), &NewBreakpoint { expression, step })
 }
 
-/// Whether the list of breakpoints is read; takes all requests out.
+/// Whether the list of breakpoints is requested; removes all requests.
 fn is_list_read(state: &mut State) -> bool {
     !calls_of::<ListBreakpoints>(state).is_empty()
 }
@@ -67,11 +67,17 @@ fn is_list_read(state: &mut State) -> bool {
 fn the_list_has_every_breakpoint_with_its_hits_and_can_switch_edit_and_remove_it() {
     let mut shown = Shown::pane(Pane::Breakpoints, |context| watched(context, 2));
     shown.says("ncc < 0.6").says("2 hits").says("step == 2").says("1 hit").says("3 hits in all runs");
-    assert_eq!(shown.click("ncc < 0.6"), [Command::Ask(Ask::Switch { number: 0, on: false })]);
-    assert_eq!(shown.click("remove breakpoint step == 2"), [Command::Ask(Ask::Remove(3))]);
-    assert_eq!(shown.click("edit breakpoint ncc < 0.6"), [Command::Ask(Ask::Edit(0))]);
-    assert_eq!(shown.click("Next hit"), [Command::Ask(Ask::NextHit)]);
-    assert_eq!(shown.click("Break at step 2"), [Command::Ask(Ask::BreakAt(2))]);
+    assert_eq!(
+        shown.click("ncc < 0.6"),
+        [Command::Breakpoints(BreakpointCommand::Switch { number: 0, on: false })]
+    );
+    assert_eq!(
+        shown.click("remove breakpoint step == 2"),
+        [Command::Breakpoints(BreakpointCommand::Remove(3))]
+    );
+    assert_eq!(shown.click("edit breakpoint ncc < 0.6"), [Command::Breakpoints(BreakpointCommand::Edit(0))]);
+    assert_eq!(shown.click("Next hit"), [Command::Breakpoints(BreakpointCommand::NextHit)]);
+    assert_eq!(shown.click("Break at step 2"), [Command::Breakpoints(BreakpointCommand::BreakAt(2))]);
 }
 
 #[test]
@@ -83,7 +89,7 @@ fn without_breakpoints_the_panel_says_how_to_get_one() {
 fn with_text(text: &'static str) -> Shown<'static> {
     Shown::pane(Pane::Breakpoints, move |context| {
         let mut state = fixture::at_step(context, 2);
-        state.perform(Command::Ask(Ask::Type(text.to_owned())));
+        state.perform(Command::Breakpoints(BreakpointCommand::Type(text.to_owned())));
         state
     })
 }
@@ -97,13 +103,16 @@ fn the_box_says_what_an_expression_is_and_what_is_wrong_with_it_and_where() {
         .says("Did you mean `ncc`?");
     with_text("sigma_m < err_px").says("`sigma_m` is in m and `err_px` is in px");
     let mut whole = with_text("ncc < 0.6");
-    assert_eq!(whole.click("Break when true"), [Command::Ask(Ask::Set)]);
-    assert_eq!(whole.click("Plot over the steps"), [Command::Ask(Ask::Plot("ncc < 0.6".to_owned()))]);
+    assert_eq!(whole.click("Break when true"), [Command::Breakpoints(BreakpointCommand::Set)]);
+    assert_eq!(
+        whole.click("Plot over the steps"),
+        [Command::Breakpoints(BreakpointCommand::Plot("ncc < 0.6".to_owned()))]
+    );
     let mut bad = with_text("ncc <");
     assert_eq!(bad.click("Break when true"), [], "what cannot be read cannot be set");
 }
 
-/// The whole state behind the panel, so that what is typed stays.
+/// Keeps the whole state behind the panel, so that entered text remains.
 fn live_box() -> egui_kittest::Harness<'static, State> {
     let state = fixture::at_step(&egui::Context::default(), 2);
     let mut harness = egui_kittest::Harness::builder().with_size([520.0, 500.0]).build_ui_state(
@@ -121,7 +130,7 @@ fn live_box() -> egui_kittest::Harness<'static, State> {
 #[test]
 fn completion_is_taken_by_arrow_keys_tab_and_enter_and_a_whole_condition_is_set_by_enter() {
     let mut harness = live_box();
-    harness.state_mut().perform(Command::Ask(Ask::Focus));
+    harness.state_mut().perform(Command::Breakpoints(BreakpointCommand::Focus));
     harness.run_steps(3);
     let box_ = || egui_kittest::kittest::by().role(egui::accesskit::Role::TextInput);
     harness.get(box_()).type_text("sig");
@@ -131,29 +140,29 @@ fn completion_is_taken_by_arrow_keys_tab_and_enter_and_a_whole_condition_is_set_
     assert!(offered > 0, "suggestions are shown");
     harness.key_press(egui::Key::Tab);
     harness.run_steps(3);
-    assert_eq!(harness.state().ask.text, "sigma_m");
+    assert_eq!(harness.state().breakpoints.text, "sigma_m");
     harness.get(box_()).type_text(" > 5 c");
     harness.run_steps(3);
     harness.key_press(egui::Key::ArrowDown);
     harness.key_press(egui::Key::ArrowUp);
     harness.key_press(egui::Key::Tab);
     harness.run_steps(3);
-    assert_eq!(harness.state().ask.text, "sigma_m > 5 cm");
+    assert_eq!(harness.state().breakpoints.text, "sigma_m > 5 cm");
     harness.state_mut().take_requests();
     harness.key_press(egui::Key::Enter);
     harness.run_steps(3);
     assert!(calls(harness.state_mut()).contains(&add(Some("sigma_m > 5 cm".to_owned()), None)));
-    assert_eq!(harness.state().ask.text, "", "the box is free for the next one");
+    assert_eq!(harness.state().breakpoints.text, "", "the box is free for the next one");
 }
 
 #[test]
 fn letters_and_the_enter_behind_them_may_come_in_one_frame() {
-    // While suggestions are open for the unfinished text before, and for letters that finish it with none open.
+    // While suggestions are open for unfinished text, and for letters that complete it while none are open.
     for (before, last) in
         [("step == 2 or step", " == 4"), ("step == 2 or step == ", "4"), ("err_px >", " 2 px")]
     {
         let mut harness = live_box();
-        harness.state_mut().perform(Command::Ask(Ask::Focus));
+        harness.state_mut().perform(Command::Breakpoints(BreakpointCommand::Focus));
         harness.run_steps(3);
         let box_ = || egui_kittest::kittest::by().role(egui::accesskit::Role::TextInput);
         harness.get(box_()).type_text(before);
@@ -172,25 +181,32 @@ fn letters_and_the_enter_behind_them_may_come_in_one_frame() {
 #[test]
 fn breaking_at_a_step_twice_takes_the_breakpoint_back() {
     let mut state = loaded(4);
-    assert_eq!(ask(&mut state, Ask::BreakAt(4)), [add(None, Some(4))]);
+    assert_eq!(calls_after(&mut state, BreakpointCommand::BreakAt(4)), [add(None, Some(4))]);
     let at = AtBreakpoint { session: "s1".to_owned(), breakpoint: 3 };
-    assert_eq!(ask(&mut state, Ask::BreakAt(2)), [Call::to::<RemoveBreakpoint>(&at)]);
-    assert_eq!(state.ask.breakpoints.len(), 1, "it is gone at once");
+    assert_eq!(calls_after(&mut state, BreakpointCommand::BreakAt(2)), [Call::to::<RemoveBreakpoint>(&at)]);
+    assert_eq!(state.breakpoints.list.len(), 1, "it is gone at once");
 }
 
 #[test]
 fn hits_are_visited_in_order_whichever_breakpoint_they_belong_to() {
     let mut state = loaded(0);
-    let mut visit = |question: Ask| {
-        state.perform(Command::Ask(question));
+    let mut visit = |question: BreakpointCommand| {
+        state.perform(Command::Breakpoints(question));
         state.cursor.step
     };
-    assert_eq!([visit(Ask::NextHit), visit(Ask::NextHit), visit(Ask::NextHit)], [2, 3, 4]);
-    assert_eq!(visit(Ask::NextHit), 4, "there is none after it");
-    assert_eq!([visit(Ask::PreviousHit), visit(Ask::PreviousHit)], [3, 2]);
-    state.ask.breakpoints[1].on = false;
+    assert_eq!(
+        [
+            visit(BreakpointCommand::NextHit),
+            visit(BreakpointCommand::NextHit),
+            visit(BreakpointCommand::NextHit)
+        ],
+        [2, 3, 4]
+    );
+    assert_eq!(visit(BreakpointCommand::NextHit), 4, "there is none after it");
+    assert_eq!([visit(BreakpointCommand::PreviousHit), visit(BreakpointCommand::PreviousHit)], [3, 2]);
+    state.breakpoints.list[1].on = false;
     state.cursor.step = 0;
-    state.perform(Command::Ask(Ask::NextHit));
+    state.perform(Command::Breakpoints(BreakpointCommand::NextHit));
     assert_eq!(state.cursor.step, 3, "what is off does not hit");
 }
 
@@ -200,7 +216,7 @@ fn hits_are_asked_again_when_the_session_changes_and_once_at_a_time() {
     let mut view = state.session.clone().unwrap();
     view.breakpoints = vec![Breakpoint { number: 0, expression: "ncc < 0.6".to_owned(), on: true }];
     let heard = |state: &mut State, view: &sightline_session::view::SessionView| {
-        state.told(Event::SessionChanged { session: "s1".to_owned() });
+        state.apply_event(Event::SessionChanged { session: "s1".to_owned() });
         state.take_requests();
         answer::<ShowSession>(state, view);
         is_list_read(state)
@@ -218,20 +234,20 @@ fn a_list_that_was_read_before_a_removal_does_not_bring_the_breakpoint_back() {
     let mut view = state.session.clone().unwrap();
     view.breakpoints = vec![Breakpoint { number: 0, expression: "ncc < 0.6".to_owned(), on: true }];
     state.session = Some(view);
-    state.ask.breakpoints = vec![breakpoint(0, "ncc < 0.6", &[1])];
-    state.ask.make_stale();
-    state.sync_ask();
+    state.breakpoints.list = vec![breakpoint(0, "ncc < 0.6", &[1])];
+    state.breakpoints.make_stale();
+    state.sync_breakpoints();
     assert!(is_list_read(&mut state));
-    ask(&mut state, Ask::Switch { number: 0, on: false });
-    ask(&mut state, Ask::Remove(0));
+    calls_after(&mut state, BreakpointCommand::Switch { number: 0, on: false });
+    calls_after(&mut state, BreakpointCommand::Remove(0));
     answer::<ListBreakpoints>(&mut state, &[breakpoint(0, "ncc < 0.6", &[1])]);
-    assert!(state.ask.breakpoints.is_empty());
-    state.sync_ask();
+    assert!(state.breakpoints.list.is_empty());
+    state.sync_breakpoints();
     assert!(is_list_read(&mut state), "it is read again");
     answer::<ListBreakpoints>(&mut state, &[(); 0]);
-    // The answer to a change that was sent before the removal does not bring it back either.
+    // The reply to a change that was sent before the removal does not restore it either.
     answer::<ChangeBreakpoint>(&mut state, &breakpoint(0, "ncc < 0.6", &[1]));
-    assert!(state.ask.breakpoints.is_empty());
+    assert!(state.breakpoints.list.is_empty());
 }
 
 /// A column over the first run whose values are the steps.
@@ -258,15 +274,19 @@ fn any_expression_becomes_a_plot_that_can_be_taken_away() {
     let mut state = loaded(2);
     let query = Query { expression: "sigma_m * 2".to_owned(), target: Some(0), values: true };
     let expected = Call::with_body::<QuerySession>(&at_session(), &query);
-    assert_eq!(ask(&mut state, Ask::Plot("sigma_m * 2".to_owned())), [expected]);
-    assert_eq!(ask(&mut state, Ask::Plot("sigma_m * 2".to_owned())), [], "it is plotted already");
-    assert_eq!(ask(&mut state, Ask::Plot("state".to_owned())), []);
+    assert_eq!(calls_after(&mut state, BreakpointCommand::Plot("sigma_m * 2".to_owned())), [expected]);
+    assert_eq!(
+        calls_after(&mut state, BreakpointCommand::Plot("sigma_m * 2".to_owned())),
+        [],
+        "it is plotted already"
+    );
+    assert_eq!(calls_after(&mut state, BreakpointCommand::Plot("state".to_owned())), []);
     assert!(state.messages.newest().unwrap().text.contains("cannot be plotted"));
     let mut shown = Shown::new(
         [520.0, 520.0],
         move |context| {
             let mut state = watched(context, 2);
-            state.perform(Command::Ask(Ask::Plot("sigma_m * 2".to_owned())));
+            state.perform(Command::Breakpoints(BreakpointCommand::Plot("sigma_m * 2".to_owned())));
             state.take_requests();
             answer::<QuerySession>(&mut state, &column("sigma_m * 2", "m"));
             state
@@ -274,13 +294,13 @@ fn any_expression_becomes_a_plot_that_can_be_taken_away() {
         plots::show,
     );
     shown.says("sigma_m * 2, m").says("2.500").says("plot of sigma_m * 2: 2.500 at step 2, from 1 to 4 m");
-    assert_eq!(shown.click("remove plot sigma_m * 2"), [Command::Ask(Ask::Unplot(0))]);
+    assert_eq!(shown.click("remove plot sigma_m * 2"), [Command::Breakpoints(BreakpointCommand::Unplot(0))]);
 }
 
 #[test]
 fn a_derived_plot_is_asked_again_when_its_runs_grow() {
     let mut state = loaded(2);
-    ask(&mut state, Ask::Plot("ncc".to_owned()));
+    calls_after(&mut state, BreakpointCommand::Plot("ncc".to_owned()));
     assert_eq!(state.take_requests(), [], "it is under way");
     answer::<QuerySession>(&mut state, &column("ncc", ""));
     assert_eq!(state.take_requests(), []);
@@ -289,7 +309,7 @@ fn a_derived_plot_is_asked_again_when_its_runs_grow() {
     let mut next = rows[4].clone();
     next.step = 5;
     rows.push(next);
-    state.told(Event::SessionChanged { session: "s1".to_owned() });
+    state.apply_event(Event::SessionChanged { session: "s1".to_owned() });
     state.take_requests();
     answer::<ShowSession>(&mut state, &view);
     assert!(!calls_of::<QuerySession>(&mut state).is_empty());

@@ -1,6 +1,6 @@
-//! What was loaded: steps, images and arrays, with a stated limit of memory.
+//! The cache of loaded steps, images and arrays, with a limit of memory.
 //!
-//! Whatever the page wants at the moment stays; of the rest, what was wanted longest ago goes first.
+//! Entries wanted in the current round are never evicted; the others are evicted least recently wanted first.
 
 mod names;
 #[cfg(test)]
@@ -17,21 +17,21 @@ use sightline_track::cycle_stage::CycleStage;
 use sightline_track::locate::template::history::AgainstEarlier;
 use sightline_track::trace::ArrayName;
 
-pub(crate) use self::names::{Eye, Key, StepKey};
+pub(crate) use self::names::{ImageSide, Key, StepKey};
 use crate::drawing::raster::Raster;
 use crate::driving::hazards::HazardRaster;
 use crate::tables::Table;
 
-/// Memory that loaded things may take, bytes.
+/// Maximum memory of loaded items, bytes.
 pub(crate) const LIMIT_BYTES: usize = 256 << 20;
 
-/// What a step's record counts as, bytes: it is small beside its images.
+/// Assumed size of a step's record, bytes; it is small compared with its images.
 const TRACE_BYTES: usize = 32 << 10;
 
-/// Seconds after which something that was not ready is asked for again.
+/// Seconds after which an item that was not ready is requested again.
 const RETRY_S: f64 = 2.0;
 
-/// Something that was loaded.
+/// A loaded item.
 #[derive(Clone)]
 pub enum Item {
     /// Of [`Key::Stop`].
@@ -42,7 +42,7 @@ pub enum Item {
     Hazards(Arc<HazardRaster>),
     /// Of [`Key::Trace`].
     Trace(Arc<RunStep>),
-    /// Of [`Key::Image`] and of a [`Key::Array`] that is a picture.
+    /// Of [`Key::Image`], and of a [`Key::Array`] that is an image.
     Raster(Arc<Raster>),
     /// Of a [`Key::Array`] that is a table.
     Table(Arc<Table>),
@@ -79,20 +79,20 @@ impl Item {
     }
 }
 
-/// How far something is.
+/// The state of an item.
 pub enum Slot<'a, T: ?Sized> {
-    /// Not asked for.
+    /// Not requested.
     Absent,
-    /// Asked for.
+    /// Requested.
     Loading,
-    /// There.
+    /// Loaded.
     Ready(&'a T),
-    /// Refused, with what the server said.
+    /// Refused, with the problem that the server reported.
     Failed(&'a Problem),
 }
 
 impl<'a, T: ?Sized> Slot<'a, T> {
-    /// What is there, if it is.
+    /// The item if it is loaded.
     pub fn ready(self) -> Option<&'a T> {
         match self {
             Self::Ready(item) => Some(item),
@@ -100,7 +100,7 @@ impl<'a, T: ?Sized> Slot<'a, T> {
         }
     }
 
-    /// What `of` finds in it; absent where it finds nothing.
+    /// Maps the loaded item with `of`; absent if `of` returns `None`.
     pub fn and<U>(self, of: impl FnOnce(&'a T) -> Option<&'a U>) -> Slot<'a, U> {
         match self {
             Self::Absent => Slot::Absent,
@@ -114,11 +114,11 @@ impl<'a, T: ?Sized> Slot<'a, T> {
 enum Entry {
     Loading,
     Waiting { until: f64 },
-    Ready { item: Item, wanted: u64 },
+    Ready { item: Item, used: u64 },
     Failed(Problem),
 }
 
-/// What was loaded, is being loaded, or was refused.
+/// The items that are loaded, being loaded, or refused.
 #[derive(Default)]
 pub struct Cache {
     entries: HashMap<Key, Entry>,
@@ -127,21 +127,21 @@ pub struct Cache {
 }
 
 impl Cache {
-    /// Memory taken, bytes.
+    /// Memory used, bytes.
     pub fn bytes(&self) -> usize {
         self.bytes
     }
 
-    /// Marks `keys`, most urgent first, as wanted, and returns those to load now: the missing ones for which
-    /// `room` finds a place.
-    pub fn want(&mut self, keys: &[Key], mut room: impl FnMut(&Key) -> bool, now: f64) -> Vec<Key> {
+    /// Marks `keys`, most urgent first, as wanted, and returns those to load now: the missing ones for which `room`
+    /// returns true.
+    pub fn request(&mut self, keys: &[Key], mut room: impl FnMut(&Key) -> bool, now: f64) -> Vec<Key> {
         self.round += 1;
         let mut missing = Vec::new();
         for key in keys {
             let key = self.holder(key).into_owned();
             let is_missing = match self.entries.get_mut(&key) {
-                Some(Entry::Ready { wanted, .. }) => {
-                    *wanted = self.round;
+                Some(Entry::Ready { used, .. }) => {
+                    *used = self.round;
                     false
                 }
                 Some(Entry::Waiting { until }) => *until <= now,
@@ -156,12 +156,12 @@ impl Cache {
         missing
     }
 
-    /// Takes what arrived for `key`. What is not ready yet is asked for again later.
-    pub fn arrived(&mut self, key: Key, outcome: Result<Item, Problem>, now: f64) {
+    /// Stores the outcome for `key`. An item that is not ready yet is requested again later.
+    pub fn store(&mut self, key: Key, outcome: Result<Item, Problem>, now: f64) {
         let entry = match outcome {
             Ok(item) => {
                 self.bytes += item.bytes();
-                Entry::Ready { item, wanted: self.round }
+                Entry::Ready { item, used: self.round }
             }
             Err(problem) if is_passing(&problem) => Entry::Waiting { until: now + RETRY_S },
             Err(problem) => Entry::Failed(problem),
@@ -172,13 +172,13 @@ impl Cache {
         self.evict(LIMIT_BYTES);
     }
 
-    /// Forgets refusals and waiting, so that everything not loaded is asked for again.
+    /// Removes failed and waiting entries selected by `which`, so that they are requested again.
     pub fn retry(&mut self, which: impl Fn(&Key) -> bool) {
         self.entries
             .retain(|key, entry| matches!(entry, Entry::Ready { .. } | Entry::Loading) || !which(key));
     }
 
-    /// Forgets what was loaded or is being loaded under these names, so that it is asked for again.
+    /// Removes the entries selected by `which`, loaded or not, so that they are requested again.
     pub(crate) fn forget(&mut self, which: impl Fn(&Key) -> bool) {
         let bytes = &mut self.bytes;
         self.entries.retain(|key, entry| {
@@ -201,7 +201,7 @@ impl Cache {
         self.entries.iter().filter_map(begun).collect()
     }
 
-    /// When the first of what is waited for is to be asked for again.
+    /// The time of the next retry, s, on the clock of `now`; `None` if nothing waits for one.
     pub fn next_retry(&self) -> Option<f64> {
         let waiting = self.entries.values().filter_map(|entry| match entry {
             Entry::Waiting { until } => Some(*until),
@@ -210,7 +210,7 @@ impl Cache {
         waiting.min_by(f64::total_cmp)
     }
 
-    /// Whether nothing is under way for it: it is here, was refused, or is to be asked for again later.
+    /// Whether no request for an item is under way: it is loaded, was refused, or waits for a retry.
     pub fn is_settled(&self, key: &Key) -> bool {
         matches!(
             self.entries.get(&self.holder(key)),
@@ -250,7 +250,7 @@ impl Cache {
         })
     }
 
-    /// An image, or an array that is a picture.
+    /// An image, or an array that is an image.
     pub fn raster(&self, key: &Key) -> Slot<'_, Raster> {
         self.slot(key).and(|item| match item {
             Item::Raster(raster) => Some(raster.as_ref()),
@@ -266,7 +266,7 @@ impl Cache {
         })
     }
 
-    /// The view of a step against the earlier templates of its run.
+    /// The comparison of a step's view with the earlier templates of its run.
     pub fn earlier_templates(&self, key: &StepKey) -> Slot<'_, [AgainstEarlier]> {
         match self.slot(&Key::EarlierTemplates(key.clone())) {
             Slot::Ready(Item::EarlierTemplates(all)) => Slot::Ready(all),
@@ -276,7 +276,7 @@ impl Cache {
         }
     }
 
-    /// What the stages of a step take.
+    /// The times of a step's stages.
     pub fn times(&self, key: &StepKey) -> Option<&[StageTime]> {
         match self.slot(&Key::Times(key.clone())) {
             Slot::Ready(Item::Times(all)) => Some(all),
@@ -284,7 +284,7 @@ impl Cache {
         }
     }
 
-    /// All that have a texture.
+    /// All items that have a texture.
     pub fn rasters(&self) -> impl Iterator<Item = &Raster> {
         let ready = self.entries.values().filter_map(|entry| match entry {
             Entry::Ready { item, .. } => Some(item),
@@ -293,7 +293,7 @@ impl Cache {
         ready.flat_map(Item::rasters)
     }
 
-    /// The name under which something is kept or loaded: an array comes with all arrays of its step.
+    /// The key under which an item is stored: an array is loaded with all arrays of its step.
     fn holder<'a>(&self, key: &'a Key) -> Cow<'a, Key> {
         match key {
             Key::Array(step, _) if !self.entries.contains_key(key) => Cow::Owned(Key::Arrays(step.clone())),
@@ -314,11 +314,11 @@ impl Cache {
         }
     }
 
-    /// Drops what was wanted longest ago until at most `limit` bytes remain; what is wanted now stays.
+    /// Removes the least recently wanted items until at most `limit` bytes remain; currently wanted items are kept.
     fn evict(&mut self, limit: usize) {
         while self.bytes > limit {
             let oldest = self.entries.iter().filter_map(|(key, entry)| match entry {
-                Entry::Ready { wanted, .. } if *wanted < self.round => Some((*wanted, key)),
+                Entry::Ready { used, .. } if *used < self.round => Some((*used, key)),
                 _ => None,
             });
             let Some(key) = oldest.min().map(|(_, key)| key.clone()) else { return };
@@ -329,7 +329,7 @@ impl Cache {
     }
 }
 
-/// Whether the same request may succeed soon: no answer, not ready yet, or too busy.
+/// Whether the same request may succeed soon: no response, not ready yet, or server busy.
 fn is_passing(problem: &Problem) -> bool {
     matches!(problem.status, 0 | 202 | 409 | 425 | 429 | 502..=504)
 }

@@ -1,4 +1,4 @@
-//! The names of what can be loaded.
+//! The keys of items that can be loaded.
 
 pub(crate) use sightline_api::location::AtStep as StepKey;
 use sightline_geometry::camera::CameraName;
@@ -6,14 +6,14 @@ use sightline_track::trace::ArrayName;
 
 /// One of the two images of a stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Eye {
+pub enum ImageSide {
     /// The left (or first) image.
     Left,
     /// The right (or second) image.
     Right,
 }
 
-impl Eye {
+impl ImageSide {
     /// The word in paths and titles.
     pub const fn word(self) -> &'static str {
         match self {
@@ -23,7 +23,7 @@ impl Eye {
     }
 }
 
-/// The name of something that can be loaded.
+/// The key of an item that can be loaded.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Key {
     /// An image of a stop.
@@ -32,9 +32,9 @@ pub enum Key {
         traverse: String,
         /// The stop.
         step: usize,
-        /// Which of the two.
-        eye: Eye,
-        /// The camera beside the main pair; `None`: the main pair.
+        /// The left or the right image.
+        side: ImageSide,
+        /// A further camera of the stop; `None`: the main pair.
         camera: Option<CameraName>,
     },
     /// A stop with its cameras.
@@ -57,17 +57,17 @@ pub enum Key {
         session: String,
         /// The stop.
         step: usize,
-        /// What of the command and of who drives has an influence on it.
+        /// The parts of the command and of the driver on which the map depends.
         rules: String,
     },
-    /// What a step saw and decided.
+    /// The record of a step.
     Trace(StepKey),
     /// An array of a step.
     Array(StepKey, ArrayName),
-    /// All arrays to which a step came.
+    /// All arrays that a step produced.
     Arrays(StepKey),
-    /// The view of a step against the earlier templates of its run.
+    /// The comparison of a step's view with the earlier templates of its run.
     EarlierTemplates(StepKey),
-    /// What the stages of a step take.
+    /// The times of a step's stages.
     Times(StepKey),
 }

@@ -1,4 +1,4 @@
-//! Everything a person can ask for, by name: what the palette finds, with the keys that do the same.
+//! All commands by name, as the palette finds them, with their keys.
 
 use sightline_session::step::StepRow;
 
@@ -6,7 +6,7 @@ use crate::breakpoints::goto;
 use crate::command::table;
 use crate::command::{Command, Go};
 use crate::exports;
-use crate::figure::wish::{Kind, Wish};
+use crate::figure::request::{FigureFormat, FigureRequest};
 use crate::layout::command::LayoutCommand;
 use crate::layout::presets::Preset;
 use crate::panels::digits;
@@ -14,28 +14,28 @@ use crate::panels::pane::Pane;
 use crate::panels::sheets::of_panel;
 use crate::state::targets::Rename;
 use crate::state::{State, events, run_letter};
-use crate::theme::Looks;
+use crate::theme::ColourTheme;
 
-/// How many findings the palette lists.
+/// Maximum number of results in the palette.
 const LISTED: usize = 12;
 
-/// One thing that can be asked for.
+/// An entry of the palette.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Action {
-    /// What it does, in words that are looked for.
+    /// The name, which the search matches.
     pub title: String,
-    /// The keys that do the same; empty without.
+    /// The keys of the command; empty without any.
     pub keys: String,
-    /// What it asks for.
+    /// The command.
     pub command: Command,
 }
 
-/// An action without keys.
+/// An entry without keys.
 fn action(title: impl Into<String>, command: Command) -> Action {
     Action { title: title.into(), keys: String::new(), command }
 }
 
-/// The actions that match the words, best first.
+/// The actions that match the words, best match first.
 pub(crate) fn find(state: &State, words: &str) -> Vec<Action> {
     let mut found = goes(state, words);
     let wanted: Vec<String> = words.split_whitespace().map(str::to_lowercase).collect();
@@ -49,7 +49,7 @@ pub(crate) fn find(state: &State, words: &str) -> Vec<Action> {
     found
 }
 
-/// Words that people type for words of the titles.
+/// Search words, each with the words of titles that they also match.
 const SYNONYMS: [(&str, &[&str]); 28] = [
     ("panel", &["show"]),
     ("view", &["show", "layout"]),
@@ -81,10 +81,10 @@ const SYNONYMS: [(&str, &[&str]); 28] = [
     ("arrangement", &["layout"]),
 ];
 
-/// How far behind a title's own words a synonym ranks.
+/// Rank penalty of a synonym against the words of the title itself.
 const SYNONYM_RANK: usize = 1000;
 
-/// Where the words begin in a title, added up, in any order; `None` where one of them is not in it, nor a synonym.
+/// Sum of the positions at which the words occur in a title; `None` if neither a word nor a synonym of it occurs.
 fn rank(title: &str, wanted: &[String]) -> Option<usize> {
     wanted.iter().map(|word| place(title, word)).sum()
 }
@@ -95,7 +95,7 @@ fn place(title: &str, word: &str) -> Option<usize> {
     own.or_else(|| others.filter_map(|other| title.find(other)).min().map(|at| SYNONYM_RANK + at))
 }
 
-/// Going to the step that a number names.
+/// The command to go to a step, if the words are a valid step number.
 fn goes(state: &State, words: &str) -> Vec<Action> {
     let step = words.trim().parse::<usize>().ok().filter(|step| *step < state.stop_count());
     step.map(|step| Action {
@@ -106,7 +106,7 @@ fn goes(state: &State, words: &str) -> Vec<Action> {
     .collect()
 }
 
-/// Every action there is at the moment.
+/// All actions that are available in this state.
 pub(crate) fn all(state: &State) -> Vec<Action> {
     let mut all = of_table(state);
     all.extend(moves(state));
@@ -153,7 +153,7 @@ fn works(state: &State) -> Vec<Action> {
     for target in state.session.iter().flat_map(|session| &session.targets) {
         for run in &target.runs {
             let title = format!("Look at {}, run {}", target.label, run_letter(run.number));
-            all.push(action(title, Command::Look { target: target.number, run: run.number }));
+            all.push(action(title, Command::SelectRun { target: target.number, run: run.number }));
         }
         let rename = Command::Rename(Rename::Begin(target.number));
         all.push(action(format!("Rename {}", target.label), rename));
@@ -188,12 +188,14 @@ fn places(state: &State) -> Vec<Action> {
         all.push(action(format!("{} as table, or as it was", pane.title()), Command::Table(pane)));
     }
     for pane in Pane::ALL {
-        all.extend(Kind::ALL.map(|kind| {
+        all.extend(FigureFormat::ALL.map(|kind| {
             let title = format!("Save {} as {}", pane.title(), kind.word());
-            action(title, Command::Exports(exports::Ask::Figure(Wish { pane, kind })))
+            action(title, Command::Exports(exports::ExportsCommand::Figure(FigureRequest { pane, kind })))
         }));
     }
-    all.extend(Looks::ALL.map(|looks| action(format!("Looks: {}", looks.title()), Command::SetLooks(looks))));
+    all.extend(ColourTheme::ALL.map(|colour_theme| {
+        action(format!("Looks: {}", colour_theme.title()), Command::SetColourTheme(colour_theme))
+    }));
     let settings = state.settings.iter().map(|info| {
         let title = format!("Setting {}: {}", info.key, info.help);
         action(title, arrange(LayoutCommand::Show(Pane::Settings)))
@@ -202,7 +204,7 @@ fn places(state: &State) -> Vec<Action> {
     all
 }
 
-/// The numbers of the cursor's step, which lead to the panel that plots them.
+/// The values of the cursor's step; the command shows the panel that plots the value.
 fn values(state: &State) -> Vec<Action> {
     let Some(row) = state.row() else { return Vec::new() };
     let numbers = |row: &StepRow| {

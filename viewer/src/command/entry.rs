@@ -10,9 +10,9 @@ use crate::state::State;
 pub(crate) struct Shortcut {
     /// The key.
     pub key: Key,
-    /// Whether Ctrl (or Command) is held.
+    /// Whether it requires Ctrl (or Command).
     pub ctrl: bool,
-    /// Whether Shift is held; `None`: either way.
+    /// Whether it requires Shift; `None`: with or without.
     pub shift: Option<bool>,
 }
 
@@ -46,7 +46,7 @@ impl Shortcut {
             && self.shift.is_none_or(|shift| shift == modifiers.shift)
     }
 
-    /// The words on the help sheet and in tooltips, such as `Ctrl+S`.
+    /// The text on the help sheet and in tooltips, such as `Ctrl+S`.
     pub(crate) fn words(self) -> String {
         let key = match self.key {
             Key::ArrowRight => "Right",
@@ -68,33 +68,33 @@ impl Shortcut {
     }
 }
 
-/// A command that the user can give by key or by name.
+/// A command that the user can give by key, by button or by name.
 #[derive(Clone, Copy)]
 pub(crate) struct UserCommand {
-    /// Name in the palette and in menus; empty: only a key gives the command.
+    /// Name in the palette and in menus; empty: not listed there.
     pub name: &'static str,
-    /// Text of the button in the bars that gives the command; empty without such a button.
+    /// Text of its button in the bars; empty: no button.
     pub icon: &'static str,
-    /// Tooltip of that button, without the keys.
+    /// Tooltip of the button, without the keys.
     pub tip: &'static str,
-    /// Keys, the one that is shown first.
+    /// Shortcuts; the first one is displayed.
     pub shortcuts: &'static [Shortcut],
-    /// The command in this state.
+    /// Returns the command for the current state.
     pub command: fn(&State) -> Command,
 }
 
 impl UserCommand {
-    /// The shortcut that is shown; empty without one.
+    /// The text of the displayed shortcut; empty without one.
     pub(crate) fn keys(&self) -> String {
         self.shortcuts.first().map(|shortcut| shortcut.words()).unwrap_or_default()
     }
 
-    /// The tooltip of its button: what it does, and the keys in brackets.
+    /// The tooltip of the button: its effect, and the keys in brackets.
     pub(crate) fn tooltip(&self) -> String {
         self.with_keys(self.tip)
     }
 
-    /// A text with the keys in brackets after it.
+    /// A text followed by the keys in brackets.
     pub(crate) fn with_keys(&self, text: &str) -> String {
         let keys = self.keys();
         if keys.is_empty() { text.to_owned() } else { format!("{text} ({keys})") }
@@ -136,21 +136,21 @@ impl Group {
     }
 }
 
-/// A line of the help sheet with the commands that it explains.
+/// A line of the help sheet, with the commands that it explains.
 #[derive(Clone, Copy)]
-pub(crate) struct Line {
+pub(crate) struct HelpLine {
     /// The group on the help sheet.
     pub group: Group,
-    /// The explanation on the help sheet; empty: the commands have no line there.
+    /// Explanation on the help sheet; empty: no line there.
     pub help: &'static str,
-    /// Keys or gestures that are no shortcut of a command; empty: the shortcuts of the commands are shown.
+    /// Keys or gestures that are not a shortcut of a command; empty: the help sheet shows the commands' shortcuts.
     pub gesture: &'static str,
-    /// The commands.
+    /// The commands that the line explains.
     pub commands: &'static [UserCommand],
 }
 
-impl Line {
-    /// Keys or gestures as the help sheet shows them.
+impl HelpLine {
+    /// The keys or gestures as displayed on the help sheet.
     pub(crate) fn keys(&self) -> String {
         if self.gesture.is_empty() {
             self.commands.iter().map(UserCommand::keys).collect::<Vec<_>>().join("  ")

@@ -1,4 +1,4 @@
-//! The help sheet and the field in which a step is typed.
+//! The help sheet, and the field for a step to go to.
 
 use egui::{Id, Key, Modal, RichText, Ui};
 
@@ -9,7 +9,7 @@ use crate::state::State;
 use crate::tour::Turn;
 use crate::{cache, theme};
 
-/// Shows the sheet or the field, whichever is open.
+/// Shows the help sheet or the field, if one of them is open.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     match &state.mode {
         Mode::Help => sheet(ui, state, out),
@@ -21,7 +21,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 fn sheet(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let modal = Modal::new(Id::unique("help")).backdrop_color(theme::shade()).show(ui.ctx(), |ui| {
         ui.set_width(470.0);
-        // What follows the list stays on the screen, however small that is.
+        // Leaves room for the text below the list, even on a small screen.
         let height = (ui.ctx().content_rect().height() - 260.0).max(120.0);
         ui.label(theme::title("Keys and pointer"));
         let words = search(ui);
@@ -55,7 +55,7 @@ fn sheet(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     }
 }
 
-/// The field that filters the keys; returns its words.
+/// Shows the field that filters the keys, and returns its text.
 fn search(ui: &mut Ui) -> String {
     let id = ui.scope_id().with("help search");
     let mut words = ui.data_mut(|data| data.get_temp::<String>(id)).unwrap_or_default();
@@ -65,7 +65,7 @@ fn search(ui: &mut Ui) -> String {
     words
 }
 
-/// The keys whose line contains all words, by group.
+/// Shows the keys whose line contains all words, by group.
 fn key_list(ui: &mut Ui, words: &str) {
     let mut is_empty = true;
     for group in table::Group::ALL {
@@ -99,9 +99,9 @@ fn matches(words: &str, keys: &str, help: &str) -> bool {
 }
 
 fn go_to(ui: &mut Ui, state: &State, typed: &str, out: &mut Vec<Command>) {
-    // What was typed before the field had the focus would otherwise be lost.
+    // Text entered before the field had the focus would otherwise be lost.
     let ahead = keys::typed_ahead(ui.ctx(), |c| !c.is_control());
-    // The letter that opened the field may come as text, too.
+    // The letter that opened the field may also arrive as text.
     let ahead = if typed.is_empty() { ahead.trim_start_matches(['g', 'G']) } else { &ahead };
     let mut text = format!("{typed}{ahead}");
     let modal = Modal::new(Id::unique("go to")).backdrop_color(theme::shade()).show(ui.ctx(), |ui| {
@@ -119,7 +119,7 @@ fn go_to(ui: &mut Ui, state: &State, typed: &str, out: &mut Vec<Command>) {
         (ui.input(|input| input.key_pressed(Key::Enter)), meant)
     });
     match modal.inner {
-        // What is wrong stays on the screen, so that it can be mended.
+        // Invalid input stays in the field, so that the user can correct it.
         (true, Err(_)) if !text.trim().is_empty() => {}
         (true, meant) => {
             out.extend(meant.ok().map(|step| Command::Go(Go::Step(step))));

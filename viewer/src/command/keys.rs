@@ -1,4 +1,4 @@
-//! Keys and what they ask for. Never a key that the browser needs.
+//! Maps keys to commands. No key is used that the browser needs.
 
 use egui::{Context, Event, Key, Modifiers};
 
@@ -11,8 +11,8 @@ use crate::picking::aim::Aim;
 use crate::state::State;
 use crate::tour::update as tour;
 
-/// Takes the keyboard away from a control that was clicked: keys are the page's again. A field of text keeps it, and so
-/// does what Tab went to.
+/// Removes the focus from a clicked control, so that the keys belong to the page again. Text fields and controls that were
+/// focused by Tab keep it.
 pub(crate) fn leave_clicked(context: &Context) {
     let is_clicked = context.input(|input| input.pointer.any_released());
     if is_clicked && !context.text_edit_focused() {
@@ -30,14 +30,14 @@ pub(crate) fn commands(context: &Context, state: &State) -> Vec<Command> {
         return Vec::new();
     }
     let is_focused = context.memory(egui::Memory::focused).is_some_and(|id| !layout::is_panel(context, id));
-    // An open list hears of the keys that move in it.
+    // An open list receives the keys that move the selection in it.
     let is_listing = egui::Popup::is_any_open(context) && !legend::is_open(context);
     let is_held = is_focused || is_listing;
     let is_divided = comparison::is_divider_focused(context);
-    let held = comparison::held(context, state);
+    let blink = comparison::blink_command(context, state);
     context.input(|input| {
         let mut out = Vec::new();
-        // What is typed after the key that opens a field, in the same frame, is meant for the field.
+        // Text entered in the same frame after the key that opens a field belongs to the field.
         let mut typed: Option<Typed> = None;
         for event in &input.events {
             match (&mut typed, event) {
@@ -48,12 +48,12 @@ pub(crate) fn commands(context: &Context, state: &State) -> Vec<Command> {
                     if is_of_divider || is_held && is_of_widgets(*key, *modifiers) {
                         continue;
                     }
-                    // Shift turns a digit into a sign that differs from keyboard to keyboard.
+                    // Shift turns a digit into a character that depends on the keyboard layout.
                     let digit = physical_key.filter(|key| modifiers.shift && is_of_arrangements(*key));
-                    let asked = command(digit.unwrap_or(*key), *modifiers, state);
-                    let opens = matches!(asked, Some(Command::SetMode(Mode::Palette(_) | Mode::GoTo(_))));
+                    let found = command(digit.unwrap_or(*key), *modifiers, state);
+                    let opens = matches!(found, Some(Command::SetMode(Mode::Palette(_) | Mode::GoTo(_))));
                     typed = opens.then(Typed::default);
-                    out.extend(asked);
+                    out.extend(found);
                 }
                 _ => {}
             }
@@ -61,21 +61,22 @@ pub(crate) fn commands(context: &Context, state: &State) -> Vec<Command> {
         if let Some((typed, opening)) = typed.zip(out.last_mut()) {
             typed.into_field(opening, state);
         }
-        out.extend(held);
+        out.extend(blink);
         out
     })
 }
 
-/// What was typed in the frame in which a field opens.
+/// Text entered in the frame in which a field opens.
 #[derive(Default)]
 struct Typed {
     words: String,
-    /// Whether Enter came behind it.
+    /// Whether Enter followed the text.
     is_entered: bool,
 }
 
 impl Typed {
-    /// Puts it into the field that `opening` opens; what was entered is done at once, where it can be.
+    /// Puts the text into the field that `opening` opens; after Enter, replaces `opening` by the resulting command if there
+    /// is one.
     fn into_field(self, opening: &mut Command, state: &State) {
         match opening {
             Command::SetMode(Mode::Palette(search)) => {
@@ -86,7 +87,7 @@ impl Typed {
                 }
             }
             Command::SetMode(Mode::GoTo(text)) => {
-                // The letter that opened the field comes as text, too.
+                // The letter that opened the field also arrives as text.
                 let words = self.words.trim_start_matches(['g', 'G']);
                 match state.step_meant(words).ok().filter(|_| self.is_entered) {
                     Some(step) => *opening = Command::Go(Go::Step(step)),
@@ -98,7 +99,7 @@ impl Typed {
     }
 }
 
-/// What was typed before a field that has just opened has the keyboard; it would otherwise be lost.
+/// Text entered before a field that has just opened has the focus; it would otherwise be lost.
 pub(crate) fn typed_ahead(context: &Context, is_part: impl Fn(char) -> bool) -> String {
     if context.text_edit_focused() {
         return String::new();
@@ -112,26 +113,26 @@ pub(crate) fn typed_ahead(context: &Context, is_part: impl Fn(char) -> bool) -> 
     })
 }
 
-/// Whether a key belongs to the control that has the keyboard: it moves a slider or presses a button.
+/// Whether a key belongs to the focused control: it moves a slider or presses a button.
 fn is_of_widgets(key: Key, modifiers: Modifiers) -> bool {
     let arrows = [Key::ArrowUp, Key::ArrowDown, Key::ArrowLeft, Key::ArrowRight];
     modifiers.is_none() && (arrows.contains(&key) || matches!(key, Key::Space | Key::Enter))
 }
 
-/// Whether Shift and this key choose an arrangement of panels.
+/// Whether Shift and this key choose a layout of panels.
 fn is_of_arrangements(key: Key) -> bool {
     use Key::*;
     [Num1, Num2, Num3, Num4, Num5, Num6, Num7, Num8].contains(&key)
 }
 
-/// Whether a key writes a character: such keys can be switched off, for who speaks to the machine (WCAG 2.1.4).
+/// Whether a key types a character. Users of speech input can disable such shortcuts (WCAG 2.1.4).
 fn is_character(key: Key) -> bool {
     use Key::*;
     let moves = [ArrowLeft, ArrowRight, ArrowUp, ArrowDown, Home, End, PageUp, PageDown];
     !moves.contains(&key) && ![Escape, Enter, Tab, Backspace, Delete].contains(&key)
 }
 
-/// What a key asks for: the entry of the table with this shortcut, unless a window or a mode takes the key.
+/// The command of a key: the table entry with this shortcut, unless a window or a mode uses the key.
 pub(crate) fn command(key: Key, modifiers: Modifiers, state: &State) -> Option<Command> {
     let is_window_open = state.exports.is_open
         || state.notes.draft.is_some()
@@ -143,7 +144,7 @@ pub(crate) fn command(key: Key, modifiers: Modifiers, state: &State) -> Option<C
         let opens_window = matches!(meant, Some(Command::Exports(_) | Command::Files(_)));
         return meant.filter(|_| is_free || !opens_window);
     }
-    // A window that is open hears of its own keys.
+    // An open window handles its own keys.
     if modifiers.alt || is_window_open {
         return None;
     }
@@ -197,10 +198,13 @@ mod tests {
         assert_eq!(press(Key::T, &state), Some(Command::SetMode(Mode::Pick)));
         assert_eq!(press(Key::F, &state), Some(Command::FitAll));
         assert_eq!(press(Key::I, &state), Some(Command::SetStretch(Stretch::None)));
-        assert_eq!(press(Key::M, &state), Some(Command::Notes(notes::Ask::Pin)));
+        assert_eq!(press(Key::M, &state), Some(Command::Notes(notes::NotesCommand::Pin)));
         let save = command(Key::S, Modifiers::COMMAND, &state);
-        assert_eq!(save, Some(Command::Exports(exports::Ask::Open)));
-        assert_eq!(command(Key::O, Modifiers::COMMAND, &state), Some(Command::Files(files::Ask::Open)));
+        assert_eq!(save, Some(Command::Exports(exports::ExportsCommand::Open)));
+        assert_eq!(
+            command(Key::O, Modifiers::COMMAND, &state),
+            Some(Command::Files(files::FilesCommand::Open))
+        );
         assert_eq!(press(Key::Escape, &state), Some(Command::SetMode(Mode::Look)));
         assert_eq!(press(Key::Questionmark, &state), Some(Command::SetMode(Mode::Help)));
         assert_eq!(press(Key::Q, &state), Some(Command::Layout(LayoutCommand::Panel(1))));
@@ -211,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_typed_in_the_frame_in_which_a_field_opens_goes_into_it() {
+    fn text_typed_in_the_opening_frame_goes_into_the_field() {
         let context = Context::default();
         let key =
             |key, modifiers| Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers };
@@ -223,17 +227,17 @@ mod tests {
             Event::Text("r".to_owned()),
         ];
         let input = egui::RawInput { events, ..Default::default() };
-        let mut asked = Vec::new();
-        let mut output = context.run_ui(input, |ui| asked = commands(ui.ctx(), &state()));
+        let mut found = Vec::new();
+        let mut output = context.run_ui(input, |ui| found = commands(ui.ctx(), &state()));
         output.textures_delta.clear();
         let words = crate::command::Search { words: "tr".to_owned(), chosen: 0 };
-        assert_eq!(asked, [Command::SetMode(Mode::Palette(words))], "no target is picked, nothing is run");
+        assert_eq!(found, [Command::SetMode(Mode::Palette(words))], "no target is picked, nothing is run");
     }
 
     #[test]
-    fn what_is_entered_in_that_frame_is_done() {
+    fn enter_in_the_opening_frame_runs_the_command() {
         let state = crate::tests::fixture::at_step(&Context::default(), 2);
-        let asked = |opening: (Key, Modifiers), text: &str| {
+        let found = |opening: (Key, Modifiers), text: &str| {
             let key = |(key, modifiers)| Event::Key {
                 key,
                 physical_key: None,
@@ -242,21 +246,21 @@ mod tests {
                 modifiers,
             };
             let events = vec![key(opening), Event::Text(text.to_owned()), key((Key::Enter, Modifiers::NONE))];
-            let mut asked = Vec::new();
+            let mut found = Vec::new();
             let input = egui::RawInput { events, ..Default::default() };
-            let mut output = Context::default().run_ui(input, |ui| asked = commands(ui.ctx(), &state));
+            let mut output = Context::default().run_ui(input, |ui| found = commands(ui.ctx(), &state));
             output.textures_delta.clear();
-            asked
+            found
         };
         let palette = (Key::K, Modifiers::COMMAND);
         let stereo = Command::Layout(LayoutCommand::Use(Preset::Stereo));
-        assert_eq!(asked(palette, "layout stereo"), [stereo]);
+        assert_eq!(found(palette, "layout stereo"), [stereo]);
         let go_to = (Key::G, Modifiers::NONE);
-        assert_eq!(asked(go_to, "g4"), [Command::Go(Go::Step(4))]);
-        // What cannot be done stays in the field.
-        assert_eq!(asked(go_to, "gnowhere"), [Command::SetMode(Mode::GoTo("nowhere".to_owned()))]);
+        assert_eq!(found(go_to, "g4"), [Command::Go(Go::Step(4))]);
+        // Invalid input stays in the field.
+        assert_eq!(found(go_to, "gnowhere"), [Command::SetMode(Mode::GoTo("nowhere".to_owned()))]);
         let search = crate::command::Search { words: "xyzzy".to_owned(), chosen: 0 };
-        assert_eq!(asked(palette, "xyzzy"), [Command::SetMode(Mode::Palette(search))]);
+        assert_eq!(found(palette, "xyzzy"), [Command::SetMode(Mode::Palette(search))]);
     }
 
     #[test]

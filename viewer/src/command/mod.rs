@@ -1,4 +1,4 @@
-//! What a person can ask for. Panels and keys make commands; `state` carries them out.
+//! The user's commands. Panels and keys create them; `state` carries them out.
 
 mod entry;
 pub(crate) mod table;
@@ -12,37 +12,38 @@ use sightline_geometry::frames::Pixel;
 use sightline_rover::visual_odometry::Fate;
 use sightline_track::settings::Changes;
 
-pub(crate) use crate::stage::{Extent, Stage};
+pub(crate) use crate::stage::{Stage, StageBarExtent};
 
+use crate::breakpoints::BreakpointCommand;
 use crate::drawing::stretch::Stretch;
 use crate::drawing::view2d::View2d;
+use crate::hovered::Hovered;
 use crate::layout::command::LayoutCommand;
 use crate::picking::aim::Aim;
-use crate::pointed::Pointed;
 use crate::shape_view::ShapeView;
 use crate::state::calculator::Calculator;
 use crate::state::targets::Rename;
-use crate::studies::Order;
+use crate::studies::StudyForm;
 use crate::tables::FeatureView;
-use crate::theme::Looks;
+use crate::theme::ColourTheme;
 use crate::tour::Turn;
-use crate::why::Ask;
+use crate::why::WhyCommand;
 use crate::{exports, notes};
 
-/// Where to go along the drive.
+/// A destination along the drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Go {
     /// To a stop.
     Step(usize),
-    /// By so many stops.
+    /// Forward by this many stops; backward if negative.
     By(isize),
     /// To the first stop.
     First,
     /// To the last stop.
     Last,
-    /// To the next change of state.
+    /// To the next change of the tracking state.
     NextEvent,
-    /// To the previous change of state.
+    /// To the previous change of the tracking state.
     PreviousEvent,
 }
 
@@ -53,11 +54,11 @@ pub enum Zoomable {
     Left,
     /// The right image.
     Right,
-    /// The surface of scores.
-    Surface,
+    /// The score map.
+    ScoreMap,
 }
 
-/// Marks that can be switched off.
+/// Layers of marks that can be hidden.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Layer {
     /// The predicted point and its gate.
@@ -70,9 +71,9 @@ pub enum Layer {
     Template,
     /// The match with its ellipse.
     Match,
-    /// The target's pixels at the steps before and after.
+    /// The target's pixels at the previous and the next steps.
     Track,
-    /// The truth.
+    /// The ground truth.
     Truth,
     /// The epipolar curve with its ticks.
     Curve,
@@ -80,47 +81,47 @@ pub enum Layer {
     Others,
     /// Features without a match, with scale and orientation.
     Keypoints,
-    /// Features whose match agrees with the motion.
+    /// Features whose match is an inlier of the motion.
     Inliers,
-    /// Features whose match does not.
+    /// Features whose match is an outlier.
     Outliers,
-    /// From where the inliers were at the earlier stop.
+    /// Displacement of the inliers from the earlier stop.
     Flow,
-    /// From where the outliers were.
+    /// Displacement of the outliers from the earlier stop.
     OutlierFlow,
-    /// From where the motion puts matched features to where they are, magnified.
+    /// Residuals of matched features, from the position predicted by the motion to the measured one, magnified.
     Residuals,
-    /// Where the bootstrap puts the target.
+    /// The bootstrap distribution of the target.
     Cloud,
-    /// How far from the prediction a registration by shape can start.
+    /// Basin of convergence of a registration by shape, about the prediction.
     Basin,
-    /// The runs that are compared with the one looked at.
+    /// The runs that are compared with the selected one.
     Compared,
-    /// How well a target would do, while one is picked.
+    /// The trackability map, while a target is being picked.
     Trackability,
     /// The goodness of the ground on the left image.
     Ground,
     /// The corners of visual odometry on the left image.
     Odometry,
-    /// The corners of one fate, on the left image and in the panel of odometry.
+    /// The corners with one outcome, on the left image and in the odometry panel.
     Corners(Fate),
 }
 
 impl Layer {
-    /// Those that would drown the picture: they are switched on by whoever wants them.
+    /// The layers that are hidden by default, because they would obscure the image.
     pub const HIDDEN_AT_FIRST: [Self; 5] =
         [Self::Keypoints, Self::OutlierFlow, Self::Residuals, Self::Odometry, Self::Ground];
 }
 
-/// What the pointer and the keys mean at the moment.
+/// The meaning of pointer and keys.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Mode {
-    /// Looking around.
+    /// The default: viewing, without picking.
     #[default]
     Look,
     /// The next click in the left image designates a target.
     Pick,
-    /// A step is being typed.
+    /// The user is entering a step; the text so far.
     GoTo(String),
     /// The help sheet is open.
     Help,
@@ -128,36 +129,36 @@ pub enum Mode {
     Palette(Search),
 }
 
-/// What is being looked for in the palette.
+/// The search in the palette.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Search {
     /// The words typed so far.
     pub words: String,
-    /// Which of the findings is chosen, from 0.
+    /// Index of the selected result, from 0.
     pub chosen: usize,
 }
 
-/// What a person asks for.
+/// A command of the user.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Command {
     /// Moves along the drive.
     Go(Go),
     /// Opens a traverse.
     OpenTraverse(String),
-    /// Looks at a run of a target.
-    Look {
+    /// Selects a run of a target.
+    SelectRun {
         /// The target's number.
         target: usize,
         /// The run's number.
         run: usize,
     },
-    /// Looks at a stage.
+    /// Selects a stage.
     SelectStage(Stage),
-    /// Looks at the stage so many places on.
+    /// Selects the stage this many positions further in the stage bar.
     StageBy(isize),
-    /// Changes what pointer and keys mean.
+    /// Changes the meaning of pointer and keys.
     SetMode(Mode),
-    /// Designates the target under a pixel of the left image.
+    /// Designates the target at a pixel of the left image.
     Pick(Pixel),
     /// Removes a target.
     RemoveTarget(usize),
@@ -165,27 +166,27 @@ pub enum Command {
     Rename(Rename),
     /// Hides the marks of a target in the images, or shows them.
     ToggleTarget(usize),
-    /// Gives the marks of a target the colour with this number, or grey.
+    /// Sets the colour of a target's marks; `None`: grey.
     ColourTarget {
         /// The target's number.
         target: usize,
-        /// The number of the colour, as [`theme::run`](crate::theme::run) takes it.
+        /// Index of the colour for [`theme::run`](crate::theme::run).
         colour: Option<usize>,
     },
-    /// Begins to designate a target again at the cursor's stop, as a target of its own.
+    /// Starts to designate a target again at the cursor's stop, as a separate target.
     Repick(usize),
-    /// Changes a setting of the draft; none takes the change back.
+    /// Changes a setting of the draft; `None` reverts it.
     Draft {
         /// The setting's name.
         key: String,
         /// The new value.
         value: Option<serde_json::Value>,
     },
-    /// Makes the draft what takes the run to the named configuration.
+    /// Sets the draft to the changes that lead from the run to the named configuration.
     UsePreset(&'static str),
-    /// Takes all changes of the draft back.
+    /// Reverts all changes of the draft.
     ClearDraft,
-    /// Runs from the cursor's step with these changes.
+    /// Forks the run at the cursor's step with these changes.
     RunFromHere(Changes),
     /// Stops a run.
     CancelRun {
@@ -194,36 +195,36 @@ pub enum Command {
         /// The run's number.
         run: usize,
     },
-    /// Lets a stopped run go on.
+    /// Resumes a stopped run.
     ResumeRun {
         /// The target's number.
         target: usize,
         /// The run's number.
         run: usize,
     },
-    /// Changes what a panel shows.
+    /// Changes the visible region of an image.
     View(Zoomable, View2d),
-    /// Changes what the calculator of the error budget is given.
+    /// Changes the inputs of the calculator of the error budget.
     SetCalculator(Calculator),
-    /// Shows the images of a further camera of the stops, or of the main pair.
+    /// Shows the images of a further camera; `None`: the main pair.
     ShowCamera(Option<CameraName>),
-    /// Stretches the grey values of the images on the screen.
+    /// Sets the contrast stretch of the displayed images.
     SetStretch(Stretch),
-    /// Filters the features and magnifies their residuals.
+    /// Filters the features and sets the magnification of their residuals.
     SetFeatureView(FeatureView),
-    /// Changes what is looked at of a registration by shape.
+    /// Changes the selection in the shape panel.
     SetShapeView(ShapeView),
-    /// Changes what the next study is made of.
-    OrderStudy(Order),
-    /// Starts that study.
+    /// Changes the inputs of the next study.
+    SetStudyForm(StudyForm),
+    /// Starts the study.
     StartStudy,
     /// Stops a study.
     CancelStudy(String),
-    /// Lets a stopped study go on.
+    /// Resumes a stopped study.
     ResumeStudy(String),
-    /// Looks at a study's table.
-    LookAtStudy(String),
-    /// Opens a study's report.
+    /// Shows the table of a study.
+    ShowStudy(String),
+    /// Opens the report of a study.
     OpenReport(String),
     /// Fits every image to its panel.
     FitAll,
@@ -235,55 +236,55 @@ pub enum Command {
     OpenRerun,
     /// Closes the live Rerun stream of the session.
     CloseRerun,
-    /// Takes a message away.
+    /// Removes a message.
     Dismiss(u64),
-    /// Connects again at once.
+    /// Reconnects to the server at once.
     Reconnect,
-    /// Moves, closes and shows panels.
+    /// Moves, closes or shows panels.
     Layout(LayoutCommand),
-    /// Copies the link to what is looked at.
+    /// Copies the link to the current view.
     CopyLink,
-    /// Chooses the looks of the page.
-    SetLooks(Looks),
-    /// Lets keys that write a character act, or only those with Ctrl.
+    /// Chooses the colour scheme of the page.
+    SetColourTheme(ColourTheme),
+    /// Whether keys that type a character act as shortcuts without Ctrl.
     SetSingleKeys(bool),
-    /// Something about comparing runs.
-    Compare(crate::compare::Ask),
-    /// Changes or takes the place that is being chosen.
+    /// A command about comparing runs.
+    Compare(crate::compare::CompareCommand),
+    /// Moves or confirms the aim of a designation by keyboard.
     Aim(Aim),
-    /// Leads through the tour.
+    /// A command about the tour.
     Tour(Turn),
-    /// Asks why a step came out as it did, tries a change, or takes a deed back.
-    Why(Ask),
-    /// Something about driving.
-    Drive(crate::driving::Ask),
-    /// Something about notes.
-    Notes(notes::Ask),
-    /// Something about exports.
-    Exports(exports::Ask),
-    /// Breakpoints, derived columns and time travel.
-    Ask(crate::breakpoints::Ask),
-    /// Something about files and sessions.
-    Files(crate::files::Ask),
+    /// A command about explanations, trials, and undo.
+    Why(WhyCommand),
+    /// A command about driving.
+    Drive(crate::driving::DrivingCommand),
+    /// A command about notes.
+    Notes(notes::NotesCommand),
+    /// A command about exports.
+    Exports(exports::ExportsCommand),
+    /// A command about breakpoints, derived columns and playback.
+    Breakpoints(BreakpointCommand),
+    /// A command about files and sessions.
+    Files(crate::files::FilesCommand),
     /// Closes the card of a problem.
     CloseCard,
-    /// Shows a panel as a table, or as it is painted again.
+    /// Toggles between a panel's table and its graphical form.
     Table(crate::panels::pane::Pane),
-    /// The limits of trackability.
-    Limits(crate::trackability::limits::Ask),
-    /// The pointer rests on something.
-    Point(Pointed),
+    /// A command about the limits of trackability.
+    Limits(crate::trackability::limits::LimitsCommand),
+    /// Sets the hovered location.
+    Hover(Hovered),
 }
 
 impl Command {
-    /// Whether it does nothing but lead to another step or stage.
+    /// Whether the command only goes to another step or stage.
     pub fn is_step(&self) -> bool {
         matches!(
             self,
             Command::Go(_)
                 | Command::SelectStage(_)
                 | Command::StageBy(_)
-                | Command::Ask(crate::breakpoints::Ask::NextHit | crate::breakpoints::Ask::PreviousHit)
+                | Command::Breakpoints(BreakpointCommand::NextHit | BreakpointCommand::PreviousHit)
         )
     }
 }

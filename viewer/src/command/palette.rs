@@ -1,4 +1,4 @@
-//! The palette: whatever can be asked for, found by typing a few letters of it.
+//! The palette: finds any command by a few letters of its name.
 
 use egui::{Id, Key, Modal, RichText, Ui, WidgetInfo};
 
@@ -21,7 +21,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         isize::from(down) - isize::from(up)
     });
     let moved = chosen.saturating_add_signed(step).min(found.len().saturating_sub(1));
-    // Hung at the top, so that the field stays where it is while the list grows and shrinks.
+    // Anchored at the top, so that the field does not move when the list grows or shrinks.
     let place = Modal::default_area(Id::unique("palette")).anchor(egui::Align2::CENTER_TOP, [0.0, 90.0]);
     let modal = Modal::new(Id::unique("palette")).area(place);
     let modal = modal.backdrop_color(theme::shade()).show(ui.ctx(), |ui| {
@@ -38,14 +38,14 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         let clicked = list(ui, &found, moved);
         ui.add_space(4.0);
         ui.label(theme::note("Up and Down choose, Enter does it, Esc closes"));
-        let asked = clicked.or_else(|| ui.input(|input| input.key_pressed(Key::Enter)).then_some(moved));
-        if asked.is_some() {
-            // The next key is the page's again, also when it comes at once.
+        let entered = clicked.or_else(|| ui.input(|input| input.key_pressed(Key::Enter)).then_some(moved));
+        if entered.is_some() {
+            // The next key belongs to the page again, even if it follows immediately.
             field.surrender_focus();
         }
-        asked
+        entered
     });
-    // What was typed in the same frame as Enter counts: the list on the screen is of the frame before.
+    // Text entered in the same frame as Enter counts; the displayed list is of the previous frame.
     let is_newer = words != search.words;
     let meant = if is_newer { actions::find(state, &words) } else { found };
     let at = modal.inner.map(|at| if is_newer { 0 } else { at });
@@ -61,7 +61,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     }
 }
 
-/// The findings; returns the one that was clicked.
+/// Shows the results; returns the index of the clicked one.
 fn list(ui: &mut Ui, found: &[Action], chosen: usize) -> Option<usize> {
     let mut clicked = None;
     for (at, action) in found.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! The palette and the keyboard: what is typed goes where it is meant, again and again.
+//! The palette and the keyboard: entered text reaches the intended field every time.
 
 use egui::{Event, Key, Modifiers};
 use egui_kittest::Harness;
@@ -11,11 +11,11 @@ use crate::state::State;
 use crate::tests::fixture;
 use crate::theme;
 
-/// The palette with the keys of the page, and what they ask for carried out.
+/// The palette with the keys of the page; their commands are carried out.
 fn page() -> Harness<'static, State> {
     let mut harness = Harness::builder().with_size([800.0, 600.0]).build_ui_state(
         |ui, state: &mut State| {
-            theme::apply(ui.ctx(), theme::Looks::Dark);
+            theme::apply(ui.ctx(), theme::ColourTheme::Dark);
             keys::leave_clicked(ui.ctx());
             let mut out = keys::commands(ui.ctx(), state);
             palette::show(ui, state, &mut out);
@@ -80,7 +80,7 @@ fn without_a_match_the_palette_lists_no_option() {
 }
 
 #[test]
-fn what_is_typed_in_the_frame_of_enter_counts() {
+fn text_typed_in_the_frame_of_enter_counts() {
     let mut harness = page();
     press(&mut harness, Key::K, Modifiers::COMMAND);
     for letter in "go to a step".chars() {

@@ -5,7 +5,7 @@
 
 use egui::{Key, Modifiers};
 
-pub(crate) use super::entry::{Group, Line, Shortcut, UserCommand};
+pub(crate) use super::entry::{Group, HelpLine, Shortcut, UserCommand};
 
 use crate::breakpoints::play::Shuttle;
 use crate::command::{Command, Go, Mode, Search};
@@ -18,12 +18,12 @@ use crate::tour::Turn;
 use crate::trackability::limits;
 use crate::{breakpoints, exports, files, notes, why};
 
-const fn line(group: Group, help: &'static str, commands: &'static [UserCommand]) -> Line {
-    Line { group, help, gesture: "", commands }
+const fn line(group: Group, help: &'static str, commands: &'static [UserCommand]) -> HelpLine {
+    HelpLine { group, help, gesture: "", commands }
 }
 
-const fn gesture(group: Group, gesture: &'static str, help: &'static str) -> Line {
-    Line { group, help, gesture, commands: &[] }
+const fn gesture(group: Group, gesture: &'static str, help: &'static str) -> HelpLine {
+    HelpLine { group, help, gesture, commands: &[] }
 }
 
 use Group::{Compare, Images, Page, Playing, Steps, Target};
@@ -43,32 +43,32 @@ pub(crate) const FIRST_STEP: Do =
 /// To the last step.
 pub(crate) const LAST_STEP: Do =
     Do::new("Last step", &[On::plain(Key::End)], |_| Command::Go(Go::Last)).button(">|", "last step");
-/// To the next change of state.
+/// To the next change of the tracking state.
 pub(crate) const NEXT_EVENT: Do =
     Do::new("Next event", &[On::plain(Key::PageDown)], |_| Command::Go(Go::NextEvent))
         .button(">>", "next event");
-/// To the previous change of state.
+/// To the previous change of the tracking state.
 pub(crate) const PREVIOUS_EVENT: Do =
     Do::new("Previous event", &[On::plain(Key::PageUp)], |_| Command::Go(Go::PreviousEvent))
         .button("<<", "previous event");
-/// Begins or ends the designation of a target.
+/// Starts or ends the designation of a target.
 pub(crate) const PICK: Do = Do::new("Pick a target", &[On::plain(Key::T)], |state| {
     Command::SetMode(if state.mode == Mode::Pick { Mode::Look } else { Mode::Pick })
 });
-/// Pins a note to what is shown.
+/// Adds a note at the current view.
 pub(crate) const PIN_NOTE: Do =
-    Do::new("Pin a note here", &[On::plain(Key::M)], |_| Command::Notes(notes::Ask::Pin));
-/// Takes the last change back.
-pub(crate) const UNDO: Do = Do::new("Undo", &[On::ctrl(Key::Z)], |_| Command::Why(why::Ask::Undo));
+    Do::new("Pin a note here", &[On::plain(Key::M)], |_| Command::Notes(notes::NotesCommand::Pin));
+/// Undoes the last change.
+pub(crate) const UNDO: Do = Do::new("Undo", &[On::ctrl(Key::Z)], |_| Command::Why(why::WhyCommand::Undo));
 /// Opens the window of exports.
 pub(crate) const EXPORT: Do =
     Do::new("Export: recording, tables, report, pictures", &[On::ctrl(Key::S)], |_| {
-        Command::Exports(exports::Ask::Open)
+        Command::Exports(exports::ExportsCommand::Open)
     })
     .button("Export", "Files, pictures, and any action as a command");
 /// Opens the window of files, sessions and drives.
 pub(crate) const OPEN: Do = Do::new("Open: a file, a recent session, a drive", &[On::ctrl(Key::O)], |_| {
-    Command::Files(files::Ask::Open)
+    Command::Files(files::FilesCommand::Open)
 })
 .button("Open", "Files, recent sessions, drives");
 /// Opens the help sheet.
@@ -80,7 +80,7 @@ pub(crate) const HELP: Do =
 /// Opens the palette.
 pub(crate) const PALETTE: Do =
     Do::new("Command palette", &[On::ctrl(Key::K)], |_| Command::SetMode(Mode::Palette(Search::default())));
-/// Copies the link to what is shown.
+/// Copies the link to the current view.
 pub(crate) const COPY_LINK: Do =
     Do::new("Copy a link to this view", &[On::plain(Key::Y)], |_| Command::CopyLink);
 /// Opens the session in Rerun.
@@ -88,14 +88,14 @@ pub(crate) const OPEN_RERUN: Do = Do::new("Open the session in Rerun", &[], |_| 
     .button("Open in Rerun", "Streams this session to a Rerun viewer in a new tab");
 /// Closes the live Rerun stream of the session.
 pub(crate) const CLOSE_RERUN: Do = Do::new("Close the Rerun stream", &[], |_| Command::CloseRerun);
-/// Lets the current panel fill the page, or restores the others.
+/// Maximises the current panel, or restores the others.
 pub(crate) const MAXIMISE: Do =
     Do::new("Fill the page with the current panel", &[On::plain(Key::Backtick)], |_| {
         Command::Layout(LayoutCommand::Maximise(None))
     });
 
 /// Every user command, in the order of the help sheet.
-pub(crate) static TABLE: &[Line] = &[
+pub(crate) static TABLE: &[HelpLine] = &[
     line(Steps, "next, previous step", &[NEXT_STEP, PREVIOUS_STEP]),
     line(
         Steps,
@@ -144,10 +144,10 @@ pub(crate) static TABLE: &[Line] = &[
         "next, previous hit of a breakpoint",
         &[
             Do::new("Breakpoints: next hit", &[On::no_shift(Key::N)], |_| {
-                Command::Ask(breakpoints::Ask::NextHit)
+                Command::Breakpoints(breakpoints::BreakpointCommand::NextHit)
             }),
             Do::new("Breakpoints: previous hit", &[On::shift(Key::N)], |_| {
-                Command::Ask(breakpoints::Ask::PreviousHit)
+                Command::Breakpoints(breakpoints::BreakpointCommand::PreviousHit)
             }),
         ],
     ),
@@ -155,14 +155,14 @@ pub(crate) static TABLE: &[Line] = &[
         Playing,
         "toggle a breakpoint at this step",
         &[Do::new("Breakpoints: toggle breakpoint here", &[On::no_shift(Key::B)], |state| {
-            Command::Ask(breakpoints::Ask::BreakAt(state.cursor.step))
+            Command::Breakpoints(breakpoints::BreakpointCommand::BreakAt(state.cursor.step))
         })],
     ),
     line(
         Playing,
         "break when: write a condition",
         &[Do::new("Breakpoints: write a condition", &[On::shift(Key::B)], |_| {
-            Command::Ask(breakpoints::Ask::Focus)
+            Command::Breakpoints(breakpoints::BreakpointCommand::Focus)
         })],
     ),
     gesture(Playing, "Tab  Enter", "in the expression box: take the suggestion, set the breakpoint"),
@@ -187,14 +187,14 @@ pub(crate) static TABLE: &[Line] = &[
         Target,
         "why: where the selected value came from",
         &[Do::new("Why: where the selected value came from", &[On::plain(Key::W)], |_| {
-            Command::Why(why::Ask::Selected)
+            Command::Why(why::WhyCommand::Selected)
         })],
     ),
     line(
         Target,
         "what would have saved this step",
         &[Do::new("What would have saved this step?", &[On::plain(Key::C)], |_| {
-            Command::Why(why::Ask::Saved)
+            Command::Why(why::WhyCommand::Saved)
         })],
     ),
     line(
@@ -202,7 +202,9 @@ pub(crate) static TABLE: &[Line] = &[
         "undo, redo",
         &[
             UNDO,
-            Do::new("Redo", &[On::ctrl(Key::Y), On::ctrl_shift(Key::Z)], |_| Command::Why(why::Ask::Redo)),
+            Do::new("Redo", &[On::ctrl(Key::Y), On::ctrl_shift(Key::Z)], |_| {
+                Command::Why(why::WhyCommand::Redo)
+            }),
         ],
     ),
     line(
@@ -228,7 +230,7 @@ pub(crate) static TABLE: &[Line] = &[
     line(Page, "cancel what was begun", &[Do::new("", &[On::plain(Key::Escape)], cancel)]),
     line(Page, "this sheet", &[HELP]),
     line(Page, "the command palette: every action by name", &[PALETTE]),
-    Line {
+    HelpLine {
         group: Page,
         help: "arrangements of the panels, from the overview to the report",
         gesture: "Shift+1 … Shift+8",
@@ -243,7 +245,7 @@ pub(crate) static TABLE: &[Line] = &[
             Do::new("", &[On::shift(Key::Num8)], |_| arrange(Preset::Image)),
         ],
     },
-    Line {
+    HelpLine {
         group: Page,
         help: "next, previous panel; Tab goes on inside it",
         gesture: "",
@@ -261,14 +263,14 @@ pub(crate) static TABLE: &[Line] = &[
         Compare,
         "first divergence of the compared runs: step and stage",
         &[Do::new("Compare: first divergence", &[On::plain(Key::D)], |_| {
-            Command::Compare(compare::Ask::FirstDivergence)
+            Command::Compare(compare::CompareCommand::FirstDivergence)
         })],
     ),
     line(
         Compare,
         "next way of comparing the left image",
         &[Do::new("Compare: next way of the left image", &[On::plain(Key::V)], |_| {
-            Command::Compare(compare::Ask::NextView)
+            Command::Compare(compare::CompareCommand::NextView)
         })],
     ),
     gesture(Compare, "X (hold)", "show the other run while the key is held"),
@@ -276,7 +278,7 @@ pub(crate) static TABLE: &[Line] = &[
         Compare,
         "hold the target still in the left image",
         &[Do::new("Hold the target still in the left image", &[On::plain(Key::S)], |_| {
-            Command::Compare(compare::Ask::Stabilise)
+            Command::Compare(compare::CompareCommand::Stabilise)
         })],
     ),
     // Commands without a key are in the palette only.
@@ -284,9 +286,11 @@ pub(crate) static TABLE: &[Line] = &[
         Page,
         "",
         &[
-            Do::new("Trackability: limits of the map", &[], |_| Command::Limits(limits::Ask::Open)),
+            Do::new("Trackability: limits of the map", &[], |_| Command::Limits(limits::LimitsCommand::Open)),
             Do::new("Discard the changed settings", &[], |_| Command::ClearDraft),
-            Do::new("Open the plain page of this step", &[], |_| Command::Exports(exports::Ask::PlainPage)),
+            Do::new("Open the plain page of this step", &[], |_| {
+                Command::Exports(exports::ExportsCommand::PlainPage)
+            }),
             OPEN_RERUN,
             CLOSE_RERUN,
             Do::new("Tour: six bubbles from a lost target to a saved one", &[], |_| {
@@ -297,7 +301,7 @@ pub(crate) static TABLE: &[Line] = &[
 ];
 
 fn shuttle(what: Shuttle) -> Command {
-    Command::Ask(breakpoints::Ask::Shuttle(what))
+    Command::Breakpoints(breakpoints::BreakpointCommand::Shuttle(what))
 }
 
 fn arrange(preset: Preset) -> Command {
@@ -306,7 +310,7 @@ fn arrange(preset: Preset) -> Command {
 
 fn run_or_branch(state: &State) -> Command {
     if state.trial().is_some() {
-        Command::Why(why::Ask::Branch)
+        Command::Why(why::WhyCommand::Branch)
     } else {
         Command::RunFromHere(state.draft.clone())
     }
@@ -314,7 +318,7 @@ fn run_or_branch(state: &State) -> Command {
 
 fn cancel(state: &State) -> Command {
     if state.mode == Mode::Look && state.trial().is_some() {
-        Command::Why(why::Ask::Discard)
+        Command::Why(why::WhyCommand::Discard)
     } else {
         Command::SetMode(Mode::Look)
     }

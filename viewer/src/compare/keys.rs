@@ -1,17 +1,17 @@
-//! What the keys mean while runs are compared: X shows the other run, the arrows move the divider of the wipe.
+//! Keys while runs are compared: X shows the other run, the arrows move the divider of the wipe.
 
 use egui::{Context, Id, Key};
 
 use crate::command::Command;
-use crate::compare::Ask;
+use crate::compare::CompareCommand;
 use crate::state::State;
 
-/// The divider of the wipe, by which the keyboard finds it.
+/// The id of the wipe divider, which can have the keyboard focus.
 pub(crate) fn wipe_id() -> Id {
     Id::unique("wipe divider")
 }
 
-/// Whether the divider has the focus, so that the keys that move it mean nothing else.
+/// Whether the divider has the focus, so that the keys that move it have no other effect.
 pub(crate) fn is_divider_focused(context: &Context) -> bool {
     context.memory(|memory| memory.has_focus(wipe_id()))
 }
@@ -21,9 +21,9 @@ pub(crate) const fn is_of_divider(key: Key) -> bool {
     matches!(key, Key::ArrowLeft | Key::ArrowRight | Key::Home | Key::End)
 }
 
-/// What holding X or letting it go asks for.
-pub(crate) fn held(context: &Context, state: &State) -> Option<Command> {
+/// The command of pressing or releasing X.
+pub(crate) fn blink_command(context: &Context, state: &State) -> Option<Command> {
     let is_held = context.input(|input| input.key_down(Key::X) && input.modifiers.is_none() && input.focused);
     let is_meant = is_held && !context.text_edit_focused() && state.is_comparing();
-    (is_meant != state.compare.is_blinking).then_some(Command::Compare(Ask::Blink(is_meant)))
+    (is_meant != state.compare.is_blinking).then_some(Command::Compare(CompareCommand::Blink(is_meant)))
 }

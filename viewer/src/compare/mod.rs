@@ -1,4 +1,4 @@
-//! What a person asks for when runs are compared: which, and how they are shown.
+//! The comparison of runs: the compared runs, the way they are shown, and the commands for both.
 
 pub(crate) mod keys;
 pub(crate) mod state;
@@ -16,21 +16,21 @@ pub enum View {
     /// The marks of all runs on one image.
     #[default]
     Marks,
-    /// Each run's surroundings of the target, side by side.
+    /// The surroundings of the target in each run, side by side.
     SideBySide,
-    /// This run left of a divider, the other right of it.
+    /// The selected run left of a divider, the other right of it.
     Wipe,
-    /// This run, and the other one while X is held.
+    /// The selected run; the other one while X is held.
     Blink,
-    /// What the two runs matched, one less the other.
+    /// The difference of the matched patches of two runs.
     Difference,
 }
 
 impl View {
-    /// All of them, in the order of the key.
+    /// All views, in the order in which the key cycles through them.
     pub const ALL: [Self; 5] = [Self::Marks, Self::SideBySide, Self::Wipe, Self::Blink, Self::Difference];
 
-    /// Its word.
+    /// The label of the view.
     pub const fn word(self) -> &'static str {
         match self {
             Self::Marks => "marks",
@@ -41,7 +41,7 @@ impl View {
         }
     }
 
-    /// What it shows.
+    /// A description of the view.
     pub const fn help(self) -> &'static str {
         match self {
             Self::Marks => "the marks of all runs on one image",
@@ -52,30 +52,30 @@ impl View {
         }
     }
 
-    /// The one after it.
+    /// The next view in the cycle.
     pub fn next(self) -> Self {
         let at = Self::ALL.iter().position(|&view| view == self).unwrap_or(0);
         Self::ALL[(at + 1) % Self::ALL.len()]
     }
 }
 
-/// From which difference on two runs count as different.
+/// Tolerance within which values of two runs count as equal.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Closeness {
-    /// Every bit counts.
+pub enum ToleranceLevel {
+    /// No tolerance: any difference counts.
     #[default]
     Exact,
-    /// What only rounding makes does not.
+    /// Rounding errors are ignored.
     Rounding,
-    /// What nobody would see in a picture does not.
+    /// Differences too small to be visible are ignored.
     Visible,
 }
 
-impl Closeness {
-    /// All of them.
+impl ToleranceLevel {
+    /// All tolerances.
     pub const ALL: [Self; 3] = [Self::Exact, Self::Rounding, Self::Visible];
 
-    /// Its word.
+    /// The label of the tolerance.
     pub const fn word(self) -> &'static str {
         match self {
             Self::Exact => "none",
@@ -84,7 +84,7 @@ impl Closeness {
         }
     }
 
-    /// By how much values of each unit may differ and still count as equal.
+    /// The tolerance of each unit; units without one must be equal.
     pub(crate) const fn tolerances(self) -> &'static [(&'static str, f64)] {
         match self {
             Self::Exact => &[],
@@ -112,7 +112,7 @@ impl Closeness {
     }
 }
 
-/// The metrics of the table of runs with their headings, and whether more is better.
+/// The metrics in the table of runs: name, heading, and whether larger is better.
 pub(crate) const METRICS: [(&str, &str, bool); 9] = [
     ("tracked_steps", "tracked", true),
     ("survival_steps", "survived", true),
@@ -125,95 +125,95 @@ pub(crate) const METRICS: [(&str, &str, bool); 9] = [
     ("mean_nees", "NEES", false),
 ];
 
-/// What the table of runs is sorted by: a metric, or nothing.
+/// The sort order of the table of runs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Sort {
-    /// The metric's name; none leaves the runs in their own order.
+    /// Name of the metric; `None`: the order of the runs.
     pub metric: Option<String>,
-    /// Whether the largest comes first.
+    /// Whether the largest value is first.
     pub is_descending: bool,
 }
 
-/// What is compared, and how it is shown.
+/// The state of the comparison.
 #[derive(Clone, Debug, Default)]
 pub struct Compare {
-    /// The runs that the one looked at is compared with, three at most.
+    /// The runs that are compared with the selected one, at most three.
     pub others: Vec<RunName>,
     /// How the left image shows them.
     pub view: View,
-    /// Which stops stand side by side.
+    /// How the stops of the runs are aligned.
     pub align: Alignment,
-    /// From which difference on they count as different.
-    pub closeness: Closeness,
-    /// Where the divider of the wipe is, from 0 to 1; none: in the middle.
+    /// The tolerance within which values count as equal.
+    pub tolerance: ToleranceLevel,
+    /// Position of the wipe divider, from 0 (left) to 1; `None`: the middle.
     pub wipe: Option<f32>,
-    /// Whether the other run is shown while a key is held.
+    /// Whether the other run is shown because its key is held.
     pub is_blinking: bool,
-    /// Whether the target is held still in the left image.
-    pub is_held: bool,
-    /// Whether the step before shines through.
+    /// Whether the left image is stabilised on the target.
+    pub is_stabilised: bool,
+    /// Whether the previous step's image is overlaid, translucent.
     pub has_onion_skin: bool,
-    /// The run with which the table compares.
+    /// The baseline run of the table.
     pub baseline: Option<RunName>,
-    /// What the table is sorted by.
+    /// The sort order of the table.
     pub sort: Sort,
-    /// The words that the table's runs must have.
+    /// The words that a run must match to be listed.
     pub filter: String,
-    /// Whether a panel that shows metrics is on the screen.
+    /// Whether a visible panel shows metrics.
     pub wants_metrics: bool,
-    pub(crate) answer: Option<(Asked, Result<Comparison, String>)>,
-    pub(crate) under_way: Option<Asked>,
+    pub(crate) answer: Option<(ComparisonRequest, Result<Comparison, String>)>,
+    pub(crate) pending_request: Option<ComparisonRequest>,
     pub(crate) jumps: bool,
     pub(crate) metrics: BTreeMap<RunName, (usize, Result<RunMetrics, String>)>,
-    pub(crate) metrics_asked: BTreeMap<RunName, usize>,
+    pub(crate) metrics_pending: BTreeMap<RunName, usize>,
 }
 
-/// A comparison as it was asked for, with how far each run was then.
+/// A requested comparison, with the progress of each run at that time.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Asked {
-    /// The session.
+pub(crate) struct ComparisonRequest {
+    /// The session's id.
     pub(crate) session: String,
-    /// What was asked.
+    /// The request.
     pub(crate) new: NewComparison,
-    /// How many steps each run had.
+    /// Number of rows of each run at the time of the request.
     pub(crate) rows: Vec<usize>,
 }
 
-/// What a person asks for.
+/// A command about comparing runs.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Ask {
-    /// Compares with a run in a place of its own, from 0; none takes what is there out.
+pub enum CompareCommand {
+    /// Compares with a run at an index of the compared runs; `None` removes the run at that index.
     With {
-        /// The place.
+        /// The index, from 0.
         place: usize,
         /// The run.
         run: Option<RunName>,
     },
-    /// Adds a run to the compared ones, or takes it out.
+    /// Adds a run to the compared ones, or removes it.
     Toggle(RunName),
-    /// Shows the comparison so.
+    /// Selects the view.
     View(View),
-    /// Shows it in the next way.
+    /// Selects the next view.
     NextView,
-    /// Aligns the runs so.
+    /// Sets the alignment of the stops.
     Align(Alignment),
-    /// Counts from this difference on.
-    Closeness(Closeness),
-    /// Goes to where this run and the first compared one differ first.
+    /// Sets the tolerance.
+    Tolerance(ToleranceLevel),
+    /// Goes to the first divergence between the selected run and the first compared one.
     FirstDivergence,
     /// Shows the other run while a key is held.
     Blink(bool),
-    /// Puts the divider of the wipe there, from 0 to 1.
+    /// Moves the wipe divider, from 0 (left) to 1.
     Wipe(f32),
-    /// Holds the target still in the left image, or lets it go.
+    /// Toggles the stabilisation of the left image on the target.
     Stabilise,
-    /// Shows the step before through the image, or does not.
+    /// Toggles the overlay of the previous step.
     OnionSkin,
-    /// Makes a run the baseline, or takes that back.
+    /// Makes a run the baseline, or clears the baseline if it is that run.
     Baseline(RunName),
     /// Sorts the table of runs.
     Sort(Sort),
-    /// Shows only the runs that have these words.
+    /// Lists only the runs that match these words.
     Filter(String),
     /// Goes to a step of a run.
     Visit {
@@ -240,11 +240,11 @@ mod tests {
     #[test]
     fn every_tolerance_has_a_unit_that_the_server_knows() {
         use sightline_session::compare::Tolerance;
-        for closeness in Closeness::ALL {
+        for level in ToleranceLevel::ALL {
             let by_unit =
-                closeness.tolerances().iter().map(|(unit, value)| ((*unit).to_owned(), *value)).collect();
+                level.tolerances().iter().map(|(unit, value)| ((*unit).to_owned(), *value)).collect();
             let tolerance = Tolerance::new(&by_unit).unwrap();
-            assert_eq!(tolerance.is_exact(), closeness == Closeness::Exact);
+            assert_eq!(tolerance.is_exact(), level == ToleranceLevel::Exact);
         }
     }
 }

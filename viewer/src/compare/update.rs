@@ -1,4 +1,4 @@
-//! The user's commands about compared runs, their calls, and what the replies change.
+//! The user's commands about compared runs, their calls, and the replies.
 
 use sightline_api::endpoint::Call;
 use sightline_api::endpoints::{CompareRuns, ShowMetrics};
@@ -8,41 +8,41 @@ use sightline_session::Cursor;
 use sightline_session::compare::{Comparison, NewComparison, RUNS_MAX, RunName};
 use sightline_session::metrics::RunMetrics;
 
-use crate::cache::{Eye, Key};
+use crate::cache::{ImageSide, Key};
 use crate::command::{Command, Go, Stage};
-use crate::compare::{Ask, Asked, Compare};
+use crate::compare::{Compare, CompareCommand, ComparisonRequest};
 use crate::state::{State, row_of};
 
-/// Requests for metrics that are under way at a time.
+/// Maximum number of concurrent requests for metrics.
 const METRICS_AT_A_TIME: usize = 2;
 
 impl State {
-    /// Reads the comparison and the metrics that are missing.
+    /// Requests the missing comparison and metrics.
     pub(crate) fn sync_compare(&mut self, session: &str) {
-        self.ask_for_comparison(session);
-        self.ask_for_metrics(session);
+        self.request_comparison(session);
+        self.request_metrics(session);
     }
 
-    fn ask_for_comparison(&mut self, session: &str) {
+    fn request_comparison(&mut self, session: &str) {
         let Some(runs) = self.compared_names() else { return };
         let rows =
             runs.iter().map(|&name| self.run_named(name).map_or(0, |(_, run)| run.rows.len())).collect();
         let (align, tolerance) = (self.compare.align, self.tolerances());
-        // Values are in the records: request only the alignment, the first divergence and the settings.
+        // The values are in the records: request only the alignment, the first divergence and the settings.
         let new = NewComparison { runs, align, tolerance, columns: Some(Vec::new()) };
-        let asked = Asked { session: session.to_owned(), new, rows };
-        let is_known = self.compare.answer.as_ref().is_some_and(|(known, _)| *known == asked);
-        if is_known || self.compare.under_way.is_some() {
+        let request = ComparisonRequest { session: session.to_owned(), new, rows };
+        let is_known = self.compare.answer.as_ref().is_some_and(|(known, _)| *known == request);
+        if is_known || self.compare.pending_request.is_some() {
             return;
         }
-        let call = Call::with_body::<CompareRuns>(&AtSession { session: session.to_owned() }, &asked.new);
-        self.compare.under_way = Some(asked.clone());
+        let call = Call::with_body::<CompareRuns>(&AtSession { session: session.to_owned() }, &request.new);
+        self.compare.pending_request = Some(request.clone());
         self.call_with_problem::<CompareRuns>(call, move |state, outcome| {
-            state.took_comparison(&asked, outcome);
+            state.on_comparison_reply(&request, outcome);
         });
     }
 
-    fn ask_for_metrics(&mut self, session: &str) {
+    fn request_metrics(&mut self, session: &str) {
         if !self.compare.wants_metrics {
             return;
         }
@@ -51,48 +51,48 @@ impl State {
             .map(|(name, _, run)| (name, run.rows.len()))
             .filter(|(name, rows)| {
                 let known = self.compare.metrics.get(name).is_some_and(|(known, _)| known == rows);
-                *rows > 0 && !known && !self.compare.metrics_asked.contains_key(name)
+                *rows > 0 && !known && !self.compare.metrics_pending.contains_key(name)
             })
-            .take(METRICS_AT_A_TIME.saturating_sub(self.compare.metrics_asked.len()))
+            .take(METRICS_AT_A_TIME.saturating_sub(self.compare.metrics_pending.len()))
             .collect();
         for (run, rows) in missing {
-            self.compare.metrics_asked.insert(run, rows);
+            self.compare.metrics_pending.insert(run, rows);
             let at = AtRun { session: session.to_owned(), target: run.target, run: run.run };
             self.call_with_problem::<ShowMetrics>(Call::to::<ShowMetrics>(&at), move |state, outcome| {
-                state.took_metrics(run, outcome);
+                state.on_metrics_reply(run, outcome);
             });
         }
     }
 
-    /// Takes a comparison, or its problem.
-    fn took_comparison(&mut self, asked: &Asked, outcome: Result<Comparison, Problem>) {
-        let Some(asked) = self.compare.under_way.take_if(|known| known == asked) else { return };
-        self.compare.answer = Some((asked, outcome.map_err(|problem| problem.detail)));
+    /// Stores a comparison, or its problem.
+    fn on_comparison_reply(&mut self, request: &ComparisonRequest, outcome: Result<Comparison, Problem>) {
+        let Some(request) = self.compare.pending_request.take_if(|known| known == request) else { return };
+        self.compare.answer = Some((request, outcome.map_err(|problem| problem.detail)));
         if std::mem::take(&mut self.compare.jumps) {
             self.go_to_first_divergence();
         }
     }
 
-    /// Takes the metrics of a run, or their problem.
-    fn took_metrics(&mut self, run: RunName, outcome: Result<RunMetrics, Problem>) {
-        if let Some(rows) = self.compare.metrics_asked.remove(&run) {
+    /// Stores the metrics of a run, or their problem.
+    fn on_metrics_reply(&mut self, run: RunName, outcome: Result<RunMetrics, Problem>) {
+        if let Some(rows) = self.compare.metrics_pending.remove(&run) {
             self.compare.metrics.insert(run, (rows, outcome.map_err(|problem| problem.detail)));
         }
     }
 
-    /// Forgets the comparisons of another session, or those that may have changed while the server was unreachable.
+    /// Discards the comparisons of another session, or those that may have changed while the server was unreachable.
     pub(crate) fn forget_comparisons(&mut self, is_other_session: bool) {
         if is_other_session {
             let (wants_metrics, view) = (self.compare.wants_metrics, self.compare.view);
             self.compare = Compare { wants_metrics, view, ..Compare::default() };
         } else {
-            (self.compare.answer, self.compare.under_way) = (None, None);
-            self.compare.metrics_asked.clear();
+            (self.compare.answer, self.compare.pending_request) = (None, None);
+            self.compare.metrics_pending.clear();
         }
     }
 
-    /// Keeps the comparison when the cursor moves to a compared run: the run before takes its place.
-    pub(crate) fn looked_elsewhere(&mut self, before: Option<RunName>, now: Cursor) {
+    /// Keeps the comparison when the user selects a compared run: the previously selected run replaces it.
+    pub(crate) fn keep_comparison(&mut self, before: Option<RunName>, now: Cursor) {
         let now = now.target.map(|target| RunName { target, run: now.run });
         let place = self.compare.others.iter().position(|&name| Some(name) == now);
         match (place, before.filter(|&name| Some(name) != now)) {
@@ -103,41 +103,42 @@ impl State {
     }
 
     /// Applies a command about compared runs.
-    pub(crate) fn ask_compare(&mut self, ask: Ask) {
-        match ask {
-            Ask::With { place, run } => self.compare_with(place, run),
-            Ask::Toggle(name) => match self.compare.others.iter().position(|&other| other == name) {
+    pub(crate) fn apply_compare_command(&mut self, command: CompareCommand) {
+        match command {
+            CompareCommand::With { place, run } => self.compare_with(place, run),
+            CompareCommand::Toggle(name) => match self.compare.others.iter().position(|&other| other == name)
+            {
                 Some(place) => self.compare_with(place, None),
                 None => self.compare_with(self.compare.others.len(), Some(name)),
             },
-            Ask::View(view) => self.compare.view = view,
-            Ask::NextView if self.is_comparing() => {
+            CompareCommand::View(view) => self.compare.view = view,
+            CompareCommand::NextView if self.is_comparing() => {
                 self.compare.view = self.compare.view.next();
                 let view = self.compare.view;
                 self.messages.note(format!("Comparison “{}”: {}.", view.word(), view.help()));
             }
-            Ask::NextView => self.say_how_to_compare(),
-            Ask::Align(align) => self.compare.align = align,
-            Ask::Closeness(closeness) => self.compare.closeness = closeness,
-            Ask::FirstDivergence => self.go_to_first_divergence(),
-            Ask::Blink(is_blinking) => self.compare.is_blinking = is_blinking,
-            Ask::Wipe(at) => self.compare.wipe = Some(at.clamp(0.0, 1.0)),
-            Ask::Stabilise => self.compare.is_held = !self.compare.is_held,
-            Ask::OnionSkin => self.compare.has_onion_skin = !self.compare.has_onion_skin,
-            Ask::Baseline(name) => {
+            CompareCommand::NextView => self.explain_how_to_compare(),
+            CompareCommand::Align(align) => self.compare.align = align,
+            CompareCommand::Tolerance(tolerance) => self.compare.tolerance = tolerance,
+            CompareCommand::FirstDivergence => self.go_to_first_divergence(),
+            CompareCommand::Blink(is_blinking) => self.compare.is_blinking = is_blinking,
+            CompareCommand::Wipe(at) => self.compare.wipe = Some(at.clamp(0.0, 1.0)),
+            CompareCommand::Stabilise => self.compare.is_stabilised = !self.compare.is_stabilised,
+            CompareCommand::OnionSkin => self.compare.has_onion_skin = !self.compare.has_onion_skin,
+            CompareCommand::Baseline(name) => {
                 let is_baseline = self.compare.baseline == Some(name);
                 self.compare.baseline = (!is_baseline).then_some(name);
             }
-            Ask::Sort(sort) => self.compare.sort = sort,
-            Ask::Filter(words) => self.compare.filter = words,
-            Ask::Visit { run, step } => {
-                self.perform(Command::Look { target: run.target, run: run.run });
+            CompareCommand::Sort(sort) => self.compare.sort = sort,
+            CompareCommand::Filter(words) => self.compare.filter = words,
+            CompareCommand::Visit { run, step } => {
+                self.perform(Command::SelectRun { target: run.target, run: run.run });
                 self.perform(Command::Go(Go::Step(step)));
             }
         }
     }
 
-    fn say_how_to_compare(&mut self) {
+    fn explain_how_to_compare(&mut self) {
         let hint =
             "Choose a run beside “vs” in the top bar. A second run comes from “Run from here” in Settings.";
         self.messages.problem("There is no run to compare with yet.", Some(hint.to_owned()));
@@ -168,7 +169,7 @@ impl State {
 
     fn go_to_first_divergence(&mut self) {
         if !self.is_comparing() {
-            self.say_how_to_compare();
+            self.explain_how_to_compare();
             return;
         }
         if let Some(problem) = self.comparison_problem().map(str::to_owned) {
@@ -196,16 +197,17 @@ impl State {
     }
 
     /// Adds the items that the compared runs need at a step: their records and arrays.
-    pub(crate) fn want_compared(&self, keys: &mut Vec<Key>) {
+    pub(crate) fn add_compared_items(&self, keys: &mut Vec<Key>) {
         let step = self.cursor.step;
         for other in self.others() {
-            // The records of the neighbours are small; arrays are fetched for the cursor's step alone.
+            // The records of the neighbouring steps are small; arrays are loaded only for the cursor's step.
             for near in [Some(step), step.checked_add(1), step.checked_sub(1)].into_iter().flatten() {
-                let there = self.beside(other.name, near).filter(|&step| row_of(other.run, step).is_some());
+                let there =
+                    self.aligned_step(other.name, near).filter(|&step| row_of(other.run, step).is_some());
                 let Some(there) = there else { continue };
                 keys.extend(self.other_key(other.name, there).map(Key::Trace));
                 if near == step {
-                    keys.extend(self.image_key_in(there, self.camera_of(other.name), Eye::Left));
+                    keys.extend(self.image_key_in(there, self.camera_of(other.name), ImageSide::Left));
                     keys.extend(self.other_key(other.name, there).map(Key::Arrays));
                 }
             }

@@ -1,7 +1,7 @@
-//! The line along which a sampled surface has a given height, by marching squares.
+//! Contour lines of a sampled grid by marching squares.
 //!
-//! Own code and not the crate `contour`: that one closes every ring along the border and around holes, where
-//! nothing was measured; here a cell with a missing corner has no line.
+//! The crate `contour` is not used because it closes every ring along the border and around missing values; here a cell
+//! with a missing corner has no line.
 
 /// A segment between two points, each (column, row) in samples.
 pub(crate) type Segment = [[f64; 2]; 2];
@@ -23,7 +23,7 @@ pub(crate) fn contour(values: &[f32], width: usize, level: f32) -> Vec<Segment> 
     segments
 }
 
-/// Adds the segments of one cell; its corners run clockwise on screen from its top left.
+/// Adds the segments of one cell; `corners` are clockwise on the screen from the top left.
 fn cell(corners: [f32; 4], level: f32, origin: [f64; 2], segments: &mut Vec<Segment>) {
     const OFFSETS: [[f64; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
     if corners.iter().any(|v| v.is_nan()) {
@@ -38,7 +38,7 @@ fn cell(corners: [f32; 4], level: f32, origin: [f64; 2], segments: &mut Vec<Segm
     };
     let mut crossed: Vec<usize> = (0..4).filter(|&i| above[i] != above[(i + 1) % 4]).collect();
     if crossed.len() == 4 {
-        // A saddle: the mean of the corners tells which two are joined through the middle.
+        // A saddle: the mean of the corners decides which two are joined through the centre.
         let joined = corners.iter().sum::<f32>() / 4.0 >= level;
         if joined == above[0] {
             crossed = vec![0, 1, 2, 3];

@@ -1,28 +1,28 @@
-//! What of a long drive is drawn: no more than the screen can tell apart, so that a frame costs the same for ten thousand
-//! steps as for a thousand.
+//! Decimation of long drives to the resolution of the screen, so that the cost of a frame does not depend on the number of
+//! steps.
 //!
-//! A curve keeps the first, the lowest, the highest and the last of its values in each of [`COLUMNS`] columns, which
-//! draws the same pixels as all of them (the M4 aggregation of Jugel, Jerzak, Hackenbroich and Markl 2014). Places on a
-//! map are taken evenly along the drive.
+//! A curve keeps the first, lowest, highest and last of its values in each of [`COLUMNS`] columns, which draws the same
+//! pixels as all of them (the M4 aggregation of Jugel, Jerzak, Hackenbroich and Markl 2014). Positions on a map are taken
+//! evenly along the drive.
 
 use std::collections::HashSet;
 
-/// Columns of a curve: no plot is wider than as many pairs of pixels.
+/// Columns of a curve, each two pixels wide in the widest plot.
 pub(crate) const COLUMNS: usize = 600;
 
-/// The most marks on one curve: more would touch.
+/// Maximum number of marks on one curve: more would touch.
 pub(crate) const MARKS: usize = 400;
 
-/// The most places of a path on a map.
+/// Maximum number of positions of a path on a map.
 pub(crate) const PLACES: usize = 1000;
 
-/// The most ellipses on a map.
+/// Maximum number of ellipses on a map.
 pub(crate) const ELLIPSES: usize = 100;
 
-/// Cells along the longer side of a path: more than a map has pixels would tell nothing apart.
+/// Cells along the longer side of a path: more than the pixels of a map would not be distinguishable.
 pub(crate) const CELLS: f64 = 512.0;
 
-/// The points of a curve, by growing x, that draw it.
+/// The points needed to draw a curve; `points` are in ascending x.
 pub(crate) fn curve(points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     let (Some(first), Some(last)) = (points.first(), points.last()) else { return points };
     if points.len() <= 4 * COLUMNS {
@@ -43,20 +43,22 @@ pub(crate) fn curve(points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     kept
 }
 
-/// The marks of a curve: all of them, or none where they would touch and the line says it.
+/// The marks of a curve: all of them, or none if they would touch, where the line suffices.
 pub(crate) fn marks(points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     if points.len() <= MARKS { points } else { Vec::new() }
 }
 
-/// At most `limit` of them, evenly chosen, the first and the last among them.
+/// At most `limit` items, evenly chosen, including the first and the last.
 pub(crate) fn evenly<T>(all: &[T], limit: usize) -> impl Iterator<Item = &T> {
     let count = all.len().min(limit);
     (0..count).map(move |k| if count < 2 { &all[0] } else { &all[k * (all.len() - 1) / (count - 1)] })
 }
 
-/// A path as the pieces that are not drawn yet: who drives to and fro, or stands, would draw the same ways again and again.
+/// The pieces of a path, without repeated segments: a rover that drives to and fro would draw the same segments many
+/// times.
 ///
-/// Two ways are the same where their ends share cells of a grid of [`CELLS`] cells over the longer side of the path.
+/// Two segments are equal if their ends are in the same cells of a grid of [`CELLS`] cells over the longer side of the
+/// path.
 pub(crate) fn path(points: &[[f64; 2]]) -> Vec<Vec<[f64; 2]>> {
     let side = |axis: usize| {
         let (low, high) =
@@ -76,7 +78,7 @@ pub(crate) fn path(points: &[[f64; 2]]) -> Vec<Vec<[f64; 2]>> {
             _ if is_new => pieces.push(pair.to_vec()),
             _ => {}
         }
-        // Standing does not end a piece; a way that is drawn already does.
+        // Standing still does not end a piece; a segment that is already drawn does.
         is_going_on = is_new || is_going_on && from == to;
     }
     if pieces.is_empty() && !points.is_empty() {
@@ -85,7 +87,7 @@ pub(crate) fn path(points: &[[f64; 2]]) -> Vec<Vec<[f64; 2]>> {
     pieces
 }
 
-/// What to say where not every one is drawn; nothing where all are.
+/// A note that not all steps are drawn; `None` if all are.
 pub(crate) fn words(count: usize, limit: usize) -> Option<String> {
     (count > limit).then(|| format!("{limit} of {count} steps are drawn"))
 }
@@ -103,7 +105,7 @@ mod tests {
         assert_eq!((thin.first(), thin.last()), (points.first(), points.last()));
         assert!(thin.contains(&[54_321.0, 9.0]), "one peak among a hundred thousand");
         assert!(thin.windows(2).all(|pair| pair[0][0] < pair[1][0]), "in order, none twice");
-        // Every column reaches as far as all of its points do.
+        // Every column has the extent of all of its points.
         let column = |point: &[f64; 2]| ((point[0] / 99_999.0 * 600.0) as usize).min(599);
         for column in thin.chunk_by(|a, b| column(a) == column(b)) {
             assert!(column.iter().any(|p| p[1] == 0.0) && column.iter().any(|p| p[1] >= 6.0));
@@ -131,7 +133,7 @@ mod tests {
             std::slice::from_ref(&straight),
             "nothing of a drive without returns is left out"
         );
-        // A detour off a way that was driven is a piece of its own.
+        // A detour from a driven segment is a separate piece.
         let detour = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [1.0, 0.0], [1.0, 1.0]];
         assert_eq!(path(&detour), [vec![[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]], vec![[1.0, 0.0], [1.0, 1.0]]]);
         assert_eq!(path(&[]), Vec::<Vec<[f64; 2]>>::new());

@@ -1,14 +1,14 @@
 //! A covariance as the outline of its ellipse.
 //!
-//! The ellipse of n σ holds the points d with `dᵀ Σ⁻¹ d = n²`; with `Σ = V diag(λ) Vᵀ` it is
-//! `n V diag(√λ) (cos t, sin t)ᵀ`. Eigenvalues below zero, which only rounding makes, count as zero.
+//! The ellipse of n σ consists of the points d with `dᵀ Σ⁻¹ d = n²`; with `Σ = V diag(λ) Vᵀ` it is `n V diag(√λ) (cos t,
+//! sin t)ᵀ`. Negative eigenvalues, which only rounding produces, are set to zero.
 
 use nalgebra::{Matrix2, Vector2};
 
 /// Points of an outline.
 const POINTS: usize = 48;
 
-/// The closed outline of `sigmas` σ about the origin; none where the covariance is not finite.
+/// The closed outline at `sigmas` σ about the origin; `None` if the covariance is not finite.
 pub(crate) fn outline(covariance: &Matrix2<f64>, sigmas: f64) -> Option<Vec<Vector2<f64>>> {
     let axes = axes(covariance)?;
     let point = |i: usize| {
@@ -18,7 +18,7 @@ pub(crate) fn outline(covariance: &Matrix2<f64>, sigmas: f64) -> Option<Vec<Vect
     Some((0..=POINTS).map(point).collect())
 }
 
-/// The two half axes of the 1 σ ellipse, the longer first.
+/// The two half axes of the 1σ ellipse, the longer first; `None` if the covariance is not finite.
 pub(crate) fn axes(covariance: &Matrix2<f64>) -> Option<[Vector2<f64>; 2]> {
     if covariance.iter().any(|v| !v.is_finite()) {
         return None;

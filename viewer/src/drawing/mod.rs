@@ -2,10 +2,10 @@
 //!
 //! | file | contents |
 //! |---|---|
-//! | `raster`, `stretch` | images and arrays as textures, and the stretching of grey values |
+//! | `raster`, `stretch` | images and arrays as textures, and the stretch of grey values |
 //! | `view2d` | the zoomable canvas |
 //! | `overlay`, `ellipse`, `contour` | marks on the canvas |
-//! | `decimate` | the points of a long drive that are worth drawing |
+//! | `decimate` | decimation of long drives for drawing |
 
 pub(crate) mod view2d;
 pub(crate) mod overlay;

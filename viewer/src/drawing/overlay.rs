@@ -1,4 +1,4 @@
-//! Marks on images: lines of 1.4 points with a dark halo of 1 point, so that they read on any rock.
+//! Marks on images: lines of 1.4 points with a dark halo of 1 point, which are visible on any rock.
 
 use egui::{Align2, Color32, Painter, Pos2, Rect, Shape, Stroke, Vec2, pos2, vec2};
 use nalgebra::Matrix2;
@@ -11,16 +11,16 @@ use crate::theme;
 
 /// Width of a line, points.
 const WIDTH: f32 = 1.4;
-/// Width of a line that is one of many, points.
+/// Width of a thin line, points.
 const THIN: f32 = 1.0;
-/// Width of its halo on either side, points.
+/// Width of a line's halo on either side, points.
 const HALO: f32 = 1.0;
 /// Half the size of a mark, points.
 const REACH: f32 = 7.0;
 
-/// How a line is drawn.
+/// The stroke of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Line {
+pub enum StrokeStyle {
     /// Without gaps.
     Solid,
     /// Dashes.
@@ -47,10 +47,10 @@ pub enum Mark {
     /// A triangle.
     Triangle,
     /// A short stretch of line.
-    Stroke(Line),
+    Stroke(StrokeStyle),
 }
 
-/// The shape that goes with a run's colour.
+/// The mark of a run, by its number.
 pub(crate) fn run_mark(number: usize) -> Mark {
     [Mark::Ring, Mark::Square, Mark::Triangle, Mark::Diamond][number % 4]
 }
@@ -68,25 +68,25 @@ impl<'a> Overlay<'a> {
     }
 
     /// A line through pixels.
-    pub(crate) fn line(&self, pixels: &[Pixel], colour: Color32, line: Line) {
+    pub(crate) fn line(&self, pixels: &[Pixel], colour: Color32, line: StrokeStyle) {
         let points: Vec<Pos2> = pixels.iter().map(|&pixel| self.transform.to_screen(pixel)).collect();
         paint_line(self.painter, &points, colour, line, WIDTH);
     }
 
-    /// A line through pixels that is one of many.
-    pub(crate) fn thin_line(&self, pixels: &[Pixel], colour: Color32, line: Line) {
+    /// A thin line through pixels.
+    pub(crate) fn thin_line(&self, pixels: &[Pixel], colour: Color32, line: StrokeStyle) {
         let points: Vec<Pos2> = pixels.iter().map(|&pixel| self.transform.to_screen(pixel)).collect();
         paint_line(self.painter, &points, colour, line, THIN);
     }
 
     /// A closed line through pixels.
-    pub(crate) fn outline(&self, pixels: &[Pixel], colour: Color32, line: Line) {
+    pub(crate) fn outline(&self, pixels: &[Pixel], colour: Color32, line: StrokeStyle) {
         let closed: Vec<Pixel> = pixels.iter().chain(pixels.first()).copied().collect();
         self.line(&closed, colour, line);
     }
 
     /// The border of a rectangle of pixels.
-    pub(crate) fn rectangle(&self, region: PixelRect, colour: Color32, line: Line) {
+    pub(crate) fn rectangle(&self, region: PixelRect, colour: Color32, line: StrokeStyle) {
         let area = self.transform.area(region);
         let corners =
             [area.left_top(), area.right_top(), area.right_bottom(), area.left_bottom(), area.left_top()];
@@ -100,7 +100,7 @@ impl<'a> Overlay<'a> {
         covariance: &Matrix2<f64>,
         sigmas: f64,
         colour: Color32,
-        line: Line,
+        line: StrokeStyle,
     ) {
         if let Some(outline) = ellipse::outline(covariance, sigmas) {
             let pixels: Vec<Pixel> = outline.iter().map(|d| centre.offset(d.x, d.y)).collect();
@@ -113,37 +113,38 @@ impl<'a> Overlay<'a> {
         paint_mark(self.painter, self.transform.to_screen(pixel), mark, colour, REACH);
     }
 
-    /// How far two pixels are apart on the screen, points.
+    /// The distance of two pixels on the screen, points.
     pub(crate) fn length(&self, from: Pixel, to: Pixel) -> f32 {
         self.transform.to_screen(from).distance(self.transform.to_screen(to))
     }
 
-    /// Words beside a pixel, offset by `offset` points.
+    /// Text beside a pixel, offset by `offset` points.
     pub(crate) fn words(&self, pixel: Pixel, offset: Vec2, words: &str, colour: Color32) {
         let at = self.transform.to_screen(pixel);
         let width = self.painter.layout_no_wrap(words.to_owned(), theme::image_font(), colour).size().x;
-        // Words that would leave the canvas on the right stand left of their place.
+        // Text that would leave the canvas on the right is placed left of the pixel.
         let leaves = at.x + offset.x + width > self.transform.rect.right() - 4.0;
         let x = if leaves { -offset.x.abs() - width } else { offset.x };
         paint_words(self.painter, at + vec2(x, offset.y), words, colour);
     }
 }
 
-/// A line with its halo. What lies outside of the painter's area is left out: a dash costs the same wherever it is.
-pub(crate) fn paint_line(painter: &Painter, points: &[Pos2], colour: Color32, line: Line, width: f32) {
+/// A line with its halo. Dashed lines are clipped to the painter's area, so that their cost does not depend on their
+/// length.
+pub(crate) fn paint_line(painter: &Painter, points: &[Pos2], colour: Color32, line: StrokeStyle, width: f32) {
     if points.len() < 2 {
         return;
     }
     let pieces = match line {
-        Line::Solid => vec![points.to_vec()],
-        Line::Dashed | Line::Dotted => inside(points, painter.clip_rect().expand(2.0 * width)),
+        StrokeStyle::Solid => vec![points.to_vec()],
+        StrokeStyle::Dashed | StrokeStyle::Dotted => inside(points, painter.clip_rect().expand(2.0 * width)),
     };
     let shapes = |piece: &[Pos2], colour: Color32, width: f32| -> Vec<Shape> {
         let stroke = Stroke::new(width, colour);
         match line {
-            Line::Solid => vec![Shape::line(piece.to_vec(), stroke)],
-            Line::Dashed => Shape::dashed_line(piece, stroke, 7.0, 5.0),
-            Line::Dotted => Shape::dotted_line(piece, colour, 5.0, width / 2.0),
+            StrokeStyle::Solid => vec![Shape::line(piece.to_vec(), stroke)],
+            StrokeStyle::Dashed => Shape::dashed_line(piece, stroke, 7.0, 5.0),
+            StrokeStyle::Dotted => Shape::dotted_line(piece, colour, 5.0, width / 2.0),
         }
     };
     for (colour, width) in [(theme::halo(), width + 2.0 * HALO), (colour, width)] {
@@ -151,7 +152,7 @@ pub(crate) fn paint_line(painter: &Painter, points: &[Pos2], colour: Color32, li
     }
 }
 
-/// The pieces of a line that lie in an area.
+/// The pieces of a line inside an area.
 fn inside(points: &[Pos2], area: Rect) -> Vec<Vec<Pos2>> {
     let mut pieces: Vec<Vec<Pos2>> = Vec::new();
     for pair in points.windows(2) {
@@ -164,8 +165,8 @@ fn inside(points: &[Pos2], area: Rect) -> Vec<Vec<Pos2>> {
     pieces
 }
 
-/// The part of a segment that lies in an area: between the last entry and the first exit over its four sides (Liang and
-/// Barsky 1984).
+/// The part of a segment inside an area: between the last entry and the first exit over its four sides (Liang and Barsky
+/// 1984).
 fn cut([from, to]: [Pos2; 2], area: Rect) -> Option<[Pos2; 2]> {
     let along = to - from;
     let (mut enters, mut leaves) = (0.0_f32, 1.0_f32);
@@ -182,7 +183,7 @@ fn cut([from, to]: [Pos2; 2], area: Rect) -> Option<[Pos2; 2]> {
             _ => leaves = leaves.min(room / step),
         }
     }
-    // Ends that are inside stay what they are, so that pieces join.
+    // Ends inside the area are returned unchanged, so that pieces join.
     let at = |t: f32, end: Pos2, is_end: bool| if is_end { end } else { from + along * t };
     (enters <= leaves).then(|| [at(enters, from, enters == 0.0), at(leaves, to, leaves == 1.0)])
 }
@@ -224,7 +225,7 @@ pub(crate) fn paint_mark(painter: &Painter, at: Pos2, mark: Mark, colour: Color3
     }
 }
 
-/// Words on a dark scrim, their left middle at `at`. Returns the area taken.
+/// Text on a dark background, its left middle at `at`. Returns its area.
 pub(crate) fn paint_words(painter: &Painter, at: Pos2, words: &str, colour: Color32) -> Rect {
     let galley = painter.layout_no_wrap(words.to_owned(), theme::image_font(), colour);
     let area = Align2::LEFT_CENTER.anchor_rect(Rect::from_min_size(at, galley.size()));
@@ -233,7 +234,7 @@ pub(crate) fn paint_words(painter: &Painter, at: Pos2, words: &str, colour: Colo
     area
 }
 
-/// A row of the legend at `at`: the mark, then its word. Returns the row's area.
+/// A row of the legend at `at`: the mark, then its label. Returns the row's area.
 pub(crate) fn paint_legend_row(
     painter: &Painter,
     at: Pos2,

@@ -1,4 +1,4 @@
-//! Pixels that came from the server, with the texture that shows them.
+//! Images and arrays from the server, with their textures.
 
 use egui::{Color32, ColorImage, TextureFilter, TextureHandle, TextureOptions};
 use sightline_track::trace::ArrayName;
@@ -10,23 +10,23 @@ use crate::theme;
 /// The difference of two normalised patches is shown between ± this many standard deviations.
 pub(crate) const DIFFERENCE_LIMIT: f32 = 2.0;
 
-/// Patches are shown from this many standard deviations below their mean to as many above.
+/// Patches are shown from this many standard deviations below their mean to the same number above.
 pub(crate) const PATCH_SIGMAS: f32 = 2.5;
 
-/// The largest side of an image that is taken, px.
+/// Maximum side of an accepted image, px.
 const SIDE_MAX: u32 = 8192;
 
-/// How the values of an array become colours.
+/// The colour map of an array.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Look {
-    /// Viridis from a value to another.
+pub enum ColourMap {
+    /// Viridis, from the first value to the second.
     Values([f32; 2]),
-    /// Blue–white–red from minus a value to it.
+    /// Blue–white–red, from minus the value to the value.
     Signed(f32),
 }
 
-impl Look {
-    /// The colour of a value; transparent where there is none.
+impl ColourMap {
+    /// The colour of a value; transparent if it is NaN.
     pub fn colour(self, value: f32) -> Color32 {
         match self {
             Self::Values([low, high]) => theme::score((value - low) / (high - low).max(f32::MIN_POSITIVE)),
@@ -34,7 +34,7 @@ impl Look {
         }
     }
 
-    /// Between which values the colours run.
+    /// The values at the ends of the colour map.
     pub fn limits(self) -> [f32; 2] {
         match self {
             Self::Values(limits) => limits,
@@ -43,33 +43,32 @@ impl Look {
     }
 }
 
-/// A grid of values and how it looks.
+/// A grid of values and its texture.
 pub struct Raster {
-    /// The values; fractions of full scale for images, scores for surfaces; NaN where there is none.
+    /// Fractions of full scale for images, scores for score maps; NaN if missing.
     pub values: GrayImage,
-    /// What shows them, one texel a value.
+    /// The texture, one texel per value.
     pub texture: TextureHandle,
-    /// Mean of the values that exist.
+    /// Mean of the finite values.
     pub mean: f32,
-    /// Standard deviation of the values that exist.
+    /// Standard deviation of the finite values.
     pub sigma: f32,
-    /// Dark and bright end of an image, from which the automatic stretch is made; of an array the values beyond which
-    /// one in a hundred lies.
+    /// Levels of an image for the automatic stretch, or the 1st and 99th percentiles of an array.
     pub levels: [f32; 2],
     options: TextureOptions,
-    /// Which array it is; none for an image of a stop.
+    /// The name of an array; `None` for an image of a stop.
     array: Option<ArrayName>,
-    /// The stretch that the texture has.
+    /// The current stretch of the texture.
     stretched: egui::mutex::Mutex<Stretch>,
-    /// How the values of an array are coloured, where that is not as it came.
-    look: egui::mutex::Mutex<Option<Look>>,
+    /// The current colour map of an array; `None` before a panel sets one.
+    colour_map: egui::mutex::Mutex<Option<ColourMap>>,
 }
 
 impl Raster {
-    /// An image of a stop from its PNG.
+    /// Decodes an image of a stop from its PNG.
     ///
     /// # Errors
-    /// A sentence when the bytes are no grey image of reasonable size.
+    /// A sentence if the bytes are not a PNG image with sides of at most 8192 px.
     pub fn from_png(context: &egui::Context, name: &str, bytes: &[u8]) -> Result<Self, String> {
         let mut reader =
             image::ImageReader::with_format(std::io::Cursor::new(bytes), image::ImageFormat::Png);
@@ -79,7 +78,7 @@ impl Raster {
         let decoded = reader.decode().map_err(|e| format!("{name} is damaged: {e}"))?;
         let values = decoded.to_luma32f();
         let colours = values.iter().map(|&v| theme::grey(v)).collect();
-        // Whole pixels when magnified, no shimmer when the image is made small.
+        // Nearest when magnified, to show whole pixels; mipmaps when reduced, to avoid aliasing.
         let options = TextureOptions {
             magnification: TextureFilter::Nearest,
             minification: TextureFilter::Linear,
@@ -89,19 +88,19 @@ impl Raster {
         Ok(Self::new(context, name, values, colours, options))
     }
 
-    /// An array of a step from its NumPy file.
+    /// Decodes an array of a step from its NumPy file.
     ///
     /// # Errors
-    /// A sentence when the bytes are no 2-D array of numbers.
+    /// A sentence if the bytes are not a 2-D array of numbers.
     pub fn from_npy(context: &egui::Context, array: ArrayName, bytes: &[u8]) -> Result<Self, String> {
         let values = npy::decode(bytes, array.word()).map_err(|e| e.to_string())?;
         Ok(Self::from_values(context, array, values))
     }
 
-    /// An array of a step from its values.
+    /// Creates an array of a step from its values.
     pub fn from_values(context: &egui::Context, array: ArrayName, values: GrayImage) -> Self {
         let (mean, sigma) = statistics(&values);
-        let colours = values.iter().map(|&v| as_it_came(array, v, [mean, sigma])).collect();
+        let colours = values.iter().map(|&v| default_colour(array, v, [mean, sigma])).collect();
         let levels = ends(&values);
         let new = Self::new(context, array.word(), values, colours, TextureOptions::NEAREST);
         Self { levels, array: Some(array), ..new }
@@ -118,11 +117,11 @@ impl Raster {
         let texture = context.load_texture(name, ColorImage::new(size, colours), options);
         let (mean, sigma) = statistics(&values);
         let (levels, stretched) = (levels(&values), egui::mutex::Mutex::new(Stretch::None));
-        let look = egui::mutex::Mutex::default();
-        Self { values, texture, mean, sigma, levels, options, array: None, stretched, look }
+        let colour_map = egui::mutex::Mutex::default();
+        Self { values, texture, mean, sigma, levels, options, array: None, stretched, colour_map }
     }
 
-    /// Gives the texture of an image a stretch, where it does not have it yet.
+    /// Applies a stretch to the texture of an image, unless it is already applied.
     pub fn stretch(&self, stretch: Stretch) {
         let mut present = self.stretched.lock();
         if *present == stretch {
@@ -134,24 +133,24 @@ impl Raster {
         self.texture.clone().set(ColorImage::new(size, colours), self.options);
     }
 
-    /// Gives the texture of an array these colours, where it has others.
-    pub fn look(&self, look: Look) {
-        let mut present = self.look.lock();
-        if *present == Some(look) {
+    /// Applies a colour map to the texture of an array, unless it is already applied.
+    pub fn set_colour_map(&self, colour_map: ColourMap) {
+        let mut present = self.colour_map.lock();
+        if *present == Some(colour_map) {
             return;
         }
-        *present = Some(look);
+        *present = Some(colour_map);
         let size = self.size().map(|side| side as usize);
-        let colours = self.values.iter().map(|&v| look.colour(v)).collect();
+        let colours = self.values.iter().map(|&v| colour_map.colour(v)).collect();
         self.texture.clone().set(ColorImage::new(size, colours), self.options);
     }
 
-    /// The pixels that the texture shows.
+    /// The colours of the texture.
     pub fn pixels(&self) -> ColorImage {
-        let (stretch, look) = (*self.stretched.lock(), *self.look.lock());
-        let colour = |v: f32| match (look, self.array) {
-            (Some(look), _) => look.colour(v),
-            (None, Some(array)) => as_it_came(array, v, [self.mean, self.sigma]),
+        let (stretch, colour_map) = (*self.stretched.lock(), *self.colour_map.lock());
+        let colour = |v: f32| match (colour_map, self.array) {
+            (Some(colour_map), _) => colour_map.colour(v),
+            (None, Some(array)) => default_colour(array, v, [self.mean, self.sigma]),
             (None, None) => theme::grey(stretch.apply(v, self.levels)),
         };
         let colours = self.values.iter().map(|&v| colour(v)).collect();
@@ -163,20 +162,20 @@ impl Raster {
         self.values.dimensions().into()
     }
 
-    /// The value at a column and row, where there is one.
+    /// The value at a column and row; `None` outside the raster and for NaN.
     pub fn at(&self, x: i64, y: i64) -> Option<f32> {
         let (x, y) = (u32::try_from(x).ok()?, u32::try_from(y).ok()?);
         self.values.get_pixel_checked(x, y).map(|p| p[0]).filter(|v| !v.is_nan())
     }
 
-    /// Memory that values and texture take.
+    /// Memory used by values and texture, bytes.
     pub fn bytes(&self) -> usize {
         self.values.as_raw().len() * (size_of::<f32>() + size_of::<Color32>())
     }
 }
 
-/// The colour of a value of an array before a panel gives it another one.
-fn as_it_came(array: ArrayName, value: f32, [mean, sigma]: [f32; 2]) -> Color32 {
+/// The default colour of an array's value, before a panel sets a colour map.
+fn default_colour(array: ArrayName, value: f32, [mean, sigma]: [f32; 2]) -> Color32 {
     match array {
         ArrayName::SURFACE => theme::score((value + 1.0) / 2.0),
         ArrayName::DIFFERENCE => theme::signed(value, DIFFERENCE_LIMIT),
@@ -184,7 +183,7 @@ fn as_it_came(array: ArrayName, value: f32, [mean, sigma]: [f32; 2]) -> Color32 
     }
 }
 
-/// The values below and above which one in a hundred lies; 0 and 1 where there is none.
+/// The 1st and 99th percentile of the finite values; 0 and 1 if there are none.
 fn ends(values: &GrayImage) -> [f32; 2] {
     let mut finite: Vec<f32> = values.iter().copied().filter(|v| v.is_finite()).collect();
     if finite.is_empty() {
@@ -197,7 +196,7 @@ fn ends(values: &GrayImage) -> [f32; 2] {
     [low, high]
 }
 
-/// Mean and standard deviation of the values that exist.
+/// Mean and standard deviation of the finite values.
 fn statistics(values: &GrayImage) -> (f32, f32) {
     let valid = || values.iter().filter(|v| v.is_finite()).map(|&v| f64::from(v));
     let count = valid().count().max(1) as f64;
@@ -228,10 +227,10 @@ mod tests {
 
     #[test]
     fn signed_values_are_coloured_about_zero_and_others_from_their_least() {
-        assert_eq!(Look::Signed(0.02).colour(0.02), theme::signed(1.0, 1.0));
-        assert_eq!(Look::Values([3.0, 5.0]).colour(3.0), theme::score(0.0));
-        assert_eq!(Look::Values([3.0, 5.0]).colour(f32::NAN), Color32::TRANSPARENT);
-        assert_eq!(Look::Signed(0.5).limits(), [-0.5, 0.5]);
+        assert_eq!(ColourMap::Signed(0.02).colour(0.02), theme::signed(1.0, 1.0));
+        assert_eq!(ColourMap::Values([3.0, 5.0]).colour(3.0), theme::score(0.0));
+        assert_eq!(ColourMap::Values([3.0, 5.0]).colour(f32::NAN), Color32::TRANSPARENT);
+        assert_eq!(ColourMap::Signed(0.5).limits(), [-0.5, 0.5]);
     }
 
     #[test]

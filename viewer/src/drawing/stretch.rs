@@ -1,18 +1,18 @@
-//! How grey values become brightness on the screen: as they are, stretched by themselves, or by hand.
+//! The mapping of grey values to brightness on the screen: as recorded, automatic, or manual.
 //!
 //! ```text
 //! as recorded   s = v
-//! automatic     s = (v − l) / (h − l)                                   l, h: 0.5 % and 99.5 % of the pixels lie below
+//! automatic     s = (v − l) / (h − l)                                   l, h: 0.5 % and 99.5 % quantiles of the grey values
 //! by hand       s = ( c (v − 0.5) + 0.5 + b )^(1/γ)
 //! ```
-//! v and s are fractions of full scale, s is held in 0 to 1. What the tracker sees is never changed.
+//! v and s are fractions of full scale, s is clamped to 0 to 1. The images that the tracker uses are never changed.
 
 use sightline_vision::image::GrayImage;
 
-/// Share of the pixels below the black, and above the white, of the automatic stretch.
+/// Share of pixels that the automatic stretch saturates to black, and to white.
 const TAIL: f64 = 0.005;
 
-/// Steps of grey that the automatic stretch tells apart.
+/// Bins of the histogram from which the automatic stretch is computed.
 const BINS: usize = 4096;
 
 /// A stretch of the images.
@@ -20,14 +20,14 @@ const BINS: usize = 4096;
 pub enum Stretch {
     /// As recorded.
     None,
-    /// From the image's own dark and bright end.
+    /// From the levels of the image.
     #[default]
     Auto,
     /// By hand.
     Manual {
-        /// What is added, fraction of full scale.
+        /// Offset, fraction of full scale.
         brightness: f32,
-        /// Magnification about the middle grey.
+        /// Factor about the middle grey.
         contrast: f32,
         /// Exponent: above 1 lifts the shadows.
         gamma: f32,
@@ -35,10 +35,10 @@ pub enum Stretch {
 }
 
 impl Stretch {
-    /// By hand, where nothing is changed yet.
+    /// The manual stretch without a change.
     pub const NEUTRAL: Self = Self::Manual { brightness: 0.0, contrast: 1.0, gamma: 1.0 };
 
-    /// Its word in the list.
+    /// Its name in the list.
     pub const fn word(self) -> &'static str {
         match self {
             Self::None => "as recorded",
@@ -47,8 +47,8 @@ impl Stretch {
         }
     }
 
-    /// The text under which a browser keeps it.
-    pub(crate) fn kept(self) -> String {
+    /// Its text in the browser's storage.
+    pub(crate) fn to_stored(self) -> String {
         match self {
             Self::None => "none".to_owned(),
             Self::Auto => "auto".to_owned(),
@@ -56,8 +56,8 @@ impl Stretch {
         }
     }
 
-    /// The stretch that was kept as this text.
-    pub(crate) fn of_kept(text: &str) -> Option<Self> {
+    /// Parses the text of `to_stored`; `None` if invalid.
+    pub(crate) fn from_stored(text: &str) -> Option<Self> {
         match text {
             "none" => Some(Self::None),
             "auto" => Some(Self::Auto),
@@ -72,7 +72,7 @@ impl Stretch {
         }
     }
 
-    /// What it does to an image whose dark and bright ends are `levels`, in words.
+    /// Its effect on an image with these `levels`, in words.
     pub fn describe(self, levels: [f32; 2]) -> String {
         match self {
             Self::None => "as recorded: 0 is black, 1 is white".to_owned(),
@@ -98,7 +98,7 @@ impl Stretch {
     }
 }
 
-/// The dark and the bright end of an image: grey values below and above which few of its pixels lie.
+/// The levels of an image: the grey values below and above which a share `TAIL` of its pixels lies.
 pub(crate) fn levels(values: &GrayImage) -> [f32; 2] {
     let mut counts = vec![0_u32; BINS];
     let mut total = 0_u64;
@@ -113,7 +113,7 @@ pub(crate) fn levels(values: &GrayImage) -> [f32; 2] {
     [low, high].map(|bin| bin as f32 / (BINS - 1) as f32)
 }
 
-/// The first of `bins` at which more than `skip` pixels were counted.
+/// The first of `bins` at which the cumulative count exceeds `skip` pixels.
 fn first_beyond(counts: &[u32], mut bins: impl Iterator<Item = usize>, skip: u64) -> Option<usize> {
     let mut seen = 0;
     bins.find(|&bin| {
@@ -141,14 +141,14 @@ mod tests {
     }
 
     #[test]
-    fn a_stretch_comes_back_as_it_was_kept() {
+    fn a_stored_stretch_is_restored() {
         for stretch in
             [Stretch::None, Stretch::Auto, Stretch::Manual { brightness: -0.1, contrast: 2.5, gamma: 0.7 }]
         {
-            assert_eq!(Stretch::of_kept(&stretch.kept()), Some(stretch));
+            assert_eq!(Stretch::from_stored(&stretch.to_stored()), Some(stretch));
         }
         for damaged in ["", "bright", "1 2", "1 2 NaN", "1 2 3 4"] {
-            assert_eq!(Stretch::of_kept(damaged), None, "{damaged}");
+            assert_eq!(Stretch::from_stored(damaged), None, "{damaged}");
         }
     }
 

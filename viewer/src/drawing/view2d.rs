@@ -1,8 +1,8 @@
 //! A zoomable canvas over pixels, and the transform between pixels and the screen.
 //!
-//! House convention: (0, 0) is the *centre* of the first pixel, so an image of W × H spans
-//! [−0.5, W − 0.5] × [−0.5, H − 0.5]. Screen positions are egui's points; on a page at 100 % they are CSS pixels.
-//! The wheel zooms about the pointer, dragging pans, a double click fits the image to its panel.
+//! Convention: (0, 0) is the *centre* of the first pixel, so that an image of W × H spans [−0.5, W − 0.5] × [−0.5, H −
+//! 0.5]. Screen positions are in egui points; on a page at 100 % they are CSS pixels. The wheel zooms about the pointer,
+//! dragging pans, a double click fits the image to its panel.
 
 use egui::{Painter, Pos2, Rect, Response, Sense, TextureHandle, Ui, Vec2, pos2, vec2};
 use sightline_geometry::frames::Pixel;
@@ -13,15 +13,15 @@ use crate::theme;
 /// The largest magnification, points per pixel.
 const SCALE_MAX: f64 = 64.0;
 
-/// From this magnification on the pixels have a grid, points per pixel.
+/// Magnification from which a pixel grid is drawn, points per pixel.
 const GRID_SCALE: f64 = 14.0;
 
-/// What part of an image a panel shows.
+/// The part of an image that a panel shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum View2d {
-    /// The whole image, as large as the panel allows.
+    /// The whole image, as large as it fits into the panel.
     Fit,
-    /// A place at a magnification.
+    /// A centre and a magnification.
     At {
         /// The pixel in the middle of the panel.
         centre: Pixel,
@@ -30,7 +30,7 @@ pub enum View2d {
     },
 }
 
-/// Takes pixels to the screen and back.
+/// Transforms pixels to the screen and back.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Transform {
     /// The panel's area on the screen.
@@ -49,7 +49,7 @@ impl Transform {
         }
     }
 
-    /// Where a pixel lies on the screen.
+    /// The screen position of a pixel.
     pub(crate) fn to_screen(self, pixel: Pixel) -> Pos2 {
         let middle = self.rect.center();
         pos2(
@@ -58,7 +58,7 @@ impl Transform {
         )
     }
 
-    /// Which pixel lies at a place of the screen.
+    /// The pixel at a screen position.
     pub(crate) fn to_pixel(self, at: Pos2) -> Pixel {
         let offset = at - self.rect.center();
         self.centre.offset(f64::from(offset.x) / self.scale, f64::from(offset.y) / self.scale)
@@ -71,60 +71,60 @@ impl Transform {
         Rect::from_min_max(self.to_screen(first), self.to_screen(last))
     }
 
-    /// The view magnified by `factor` with the pixel under `at` kept in its place.
+    /// The view magnified by `factor`, with the pixel under `at` fixed.
     pub(crate) fn zoomed(&self, at: Pos2, factor: f64, region: PixelRect) -> View2d {
         let smallest = fit_scale(region, self.rect) / 2.0;
         let scale = (self.scale * factor).clamp(smallest.min(SCALE_MAX), SCALE_MAX);
         let (kept, offset) = (self.to_pixel(at), at - self.rect.center());
         let centre = kept.offset(-f64::from(offset.x) / scale, -f64::from(offset.y) / scale);
-        View2d::At { centre: held_inside(centre, region), scale }
+        View2d::At { centre: clamped_to(centre, region), scale }
     }
 
     /// The view moved by a drag of `delta` points.
     pub(crate) fn panned(&self, delta: Vec2, region: PixelRect) -> View2d {
         let centre = self.centre.offset(-f64::from(delta.x) / self.scale, -f64::from(delta.y) / self.scale);
-        View2d::At { centre: held_inside(centre, region), scale: self.scale }
+        View2d::At { centre: clamped_to(centre, region), scale: self.scale }
     }
 }
 
-/// The magnification at which `region` just fits into `rect`.
+/// The largest magnification at which `region` fits into `rect`, points per pixel.
 fn fit_scale(region: PixelRect, rect: Rect) -> f64 {
     let across = f64::from(rect.width()) / f64::from(region.width.max(1));
     let down = f64::from(rect.height()) / f64::from(region.height.max(1));
     across.min(down).max(1e-3)
 }
 
-/// The place, held on the image so that it never gets lost.
-fn held_inside(at: Pixel, region: PixelRect) -> Pixel {
+/// The nearest position inside the image, so that a view never leaves it.
+fn clamped_to(at: Pixel, region: PixelRect) -> Pixel {
     let hold = |v: f64, start: i32, length: u32| {
         v.clamp(f64::from(start) - 0.5, f64::from(start) + f64::from(length) - 0.5)
     };
     Pixel::new(hold(at.x, region.x, region.width), hold(at.y, region.y, region.height))
 }
 
-/// A canvas that was laid out and listens to the pointer.
+/// A canvas after layout, with its pointer input.
 pub(crate) struct Canvas {
     /// Clicks and hover on it.
     pub response: Response,
-    /// Paints inside it only.
+    /// Paints inside the canvas only.
     pub painter: Painter,
     /// Its transform.
     pub transform: Transform,
-    /// The view that the pointer asked for, where it asked.
+    /// The view that the pointer input leads to; `None` if unchanged.
     pub moved: Option<View2d>,
-    /// Where the pointer is, also while it is on a handle that lies on the canvas.
+    /// The position of the pointer, also while it is over a handle on the canvas.
     pointer: Option<Pos2>,
 }
 
 impl Canvas {
-    /// Takes the rest of `ui`, less `below` points at its bottom, as a canvas for the pixels of `region`.
+    /// Allocates the rest of `ui`, less `below` points at its bottom, as a canvas for the pixels of `region`.
     pub(crate) fn new(ui: &mut Ui, view: View2d, region: PixelRect, below: f32) -> Self {
         let size = vec2(ui.available_width().max(24.0), (ui.available_height() - below).max(24.0));
         let (rect, response) = ui.allocate_exact_size(size, Sense::click_and_drag());
         let painter = ui.painter_at(rect);
         painter.rect_filled(rect, 0.0, theme::well());
         let transform = Transform::new(view, region, rect);
-        let moved = asked_for(ui, &response, &transform, region);
+        let moved = view_from_input(ui, &response, &transform, region);
         let pointer = ui.input(|input| input.pointer.hover_pos()).filter(|_| ui.rect_contains_pointer(rect));
         Self { response, painter, transform, moved, pointer }
     }
@@ -135,13 +135,13 @@ impl Canvas {
         self.painter.image(texture.id(), self.transform.area(region), whole, theme::UNTINTED);
     }
 
-    /// The pixel under the pointer, where that is on the pixels of `region`.
+    /// The pixel under the pointer; `None` outside `region`.
     pub(crate) fn hovered(&self, region: PixelRect) -> Option<Pixel> {
         let pixel = self.transform.to_pixel(self.pointer?);
         region.contains(pixel).then_some(pixel)
     }
 
-    /// Lines between the pixels once they are large.
+    /// Lines between the pixels, from a magnification of `GRID_SCALE`.
     pub(crate) fn pixel_grid(&self, region: PixelRect) {
         if self.transform.scale < GRID_SCALE {
             return;
@@ -159,13 +159,13 @@ impl Canvas {
         }
     }
 
-    /// The pattern that stands for no data.
+    /// The pattern for missing data.
     pub(crate) fn checker(&self, region: PixelRect) {
         checker(&self.painter, self.transform.area(region).intersect(self.transform.rect));
     }
 }
 
-/// Paints the pattern that stands for no data.
+/// Paints the pattern for missing data.
 pub(crate) fn checker(painter: &Painter, area: Rect) {
     const SIDE: f32 = 8.0;
     if !area.is_positive() {
@@ -182,8 +182,8 @@ pub(crate) fn checker(painter: &Painter, area: Rect) {
     }
 }
 
-/// The view that wheel, drag or double click ask for.
-fn asked_for(ui: &Ui, response: &Response, transform: &Transform, region: PixelRect) -> Option<View2d> {
+/// The view that wheel, drag or double click lead to; `None` if unchanged.
+fn view_from_input(ui: &Ui, response: &Response, transform: &Transform, region: PixelRect) -> Option<View2d> {
     if response.double_clicked() {
         return Some(View2d::Fit);
     }

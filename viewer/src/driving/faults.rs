@@ -1,18 +1,18 @@
-//! Faults that a person injects into a drive, to see how it copes with them.
+//! Faults that the user injects into a drive.
 
 use egui::{CollapsingHeader, ComboBox, DragValue, Label, Ui};
 use sightline_session::faults::NewFault;
 use sightline_world::scenario::{Fault, FaultKind};
 
 use crate::command::Command;
-use crate::driving::Ask;
+use crate::driving::DrivingCommand;
 use crate::state::State;
 use crate::{panels, theme};
 
-/// How many stops a new fault lasts.
+/// Default duration of a new fault, stops.
 const STOPS: u32 = 3;
 
-/// The faults of the next drive or branch.
+/// Shows the faults of the next drive or branch.
 pub(super) fn form(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let mut faults = state.driving.faults.clone();
     CollapsingHeader::new(theme::label("inject faults")).id_salt("faults").show(ui, |ui| {
@@ -35,11 +35,11 @@ pub(super) fn form(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         }
     });
     if faults != state.driving.faults {
-        out.push(Command::Drive(Ask::Faults(faults)));
+        out.push(Command::Drive(DrivingCommand::Faults(faults)));
     }
 }
 
-/// A fault at the stops after the one that is looked at; without a drive after the first one.
+/// A fault at the stops after the cursor's; without a drive, after the first stop.
 fn new(state: &State) -> NewFault {
     let from_step = if state.is_on_commands() { state.cursor.step } else { 0 };
     let from_stop = from_step as u32 + 1;
@@ -82,7 +82,7 @@ fn row(ui: &mut Ui, state: &State, (index, fault): (usize, &mut NewFault)) {
     }
 }
 
-/// One line with the faults of a drive.
+/// Shows the faults of a drive on one line.
 pub(super) fn list(ui: &mut Ui, faults: &[Fault]) {
     if faults.is_empty() {
         return;

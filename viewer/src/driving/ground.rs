@@ -1,4 +1,4 @@
-//! The layer of the goodness map over the left image: every known cell as a square at its height, through the camera of the stop.
+//! The goodness map on the left image: every known cell as a square at its height, projected by the camera of the stop.
 
 use egui::epaint::{Mesh, Vertex, WHITE_UV};
 use egui::{Rect, Shape};
@@ -13,7 +13,7 @@ use crate::panels::legend::Entry;
 use crate::state::State;
 use crate::theme;
 
-/// What the legend of the left image lists, where the navigator chose on a goodness map.
+/// The legend entry of the layer; `None` if the navigator used no goodness map.
 pub(crate) fn entry(state: &State) -> Option<Entry> {
     let word = "goodness of the ground, red is bad";
     state.has_hazards().then(|| Entry::new(Layer::Ground, Mark::Square, theme::goodness(100), word))
@@ -25,7 +25,7 @@ pub(crate) fn paint(canvas: &Canvas, state: &State) {
         return;
     }
     let (Some(view), Some((camera, _)), Some(stop)) =
-        (super::hazards::view(state), state.eyes(), state.stop())
+        (super::hazards::view(state), state.stereo_cameras(), state.stop())
     else {
         return;
     };
@@ -45,7 +45,7 @@ pub(crate) fn paint(canvas: &Canvas, state: &State) {
     canvas.painter.with_clip_rect(clip).add(Shape::mesh(mesh));
 }
 
-/// The cells with a height whose middle the camera sees: corners in its image, px, and goodness, %.
+/// The known cells with a height whose centre is visible to the camera: corners in the image, px, and goodness, %.
 pub(crate) fn cells(view: &HazardView, camera: &Camera, site_from_rover: &Pose) -> Vec<([Pixel; 4], i8)> {
     let rover_from_site = site_from_rover.inverse();
     let seen = |[x, y]: [f64; 2], z: f64| rover_from_site * Point3::new(x, y, z);

@@ -1,4 +1,4 @@
-//! The layer of the goodness map on the map of the drive: its texture, its fetching, and the ground at the pointer in words.
+//! The goodness map on the map of the drive: its texture, its requests, and a description of the ground at the pointer.
 
 use std::sync::Arc;
 
@@ -13,30 +13,30 @@ use crate::panels::numbers::fixed;
 use crate::state::State;
 use crate::theme;
 
-/// The goodness map of a stop with the texture that shows its known cells.
+/// The goodness map of a stop, with the texture of its known cells.
 pub struct HazardRaster {
     /// The map.
     pub view: Arc<HazardView>,
-    /// What shows it, one texel a cell, north up; `None` where no cell is known.
-    pub(crate) shown: Option<Shown>,
+    /// The texture, one texel per cell, north up; `None` if no cell is known.
+    pub(crate) texture: Option<GoodnessTexture>,
 }
 
-/// How a goodness map is shown.
-pub(crate) struct Shown {
+/// The texture of a goodness map, with its position.
+pub(crate) struct GoodnessTexture {
     texture: TextureHandle,
-    /// Middle and size, east and north, m.
+    /// Centre and size: east and north, m.
     pub(crate) middle_m: [f64; 2],
     pub(crate) size_m: [f32; 2],
 }
 
 impl HazardRaster {
-    /// Makes the texture of a map.
+    /// Creates the texture of a map.
     pub(crate) fn new(context: &Context, view: HazardView) -> Self {
-        let shown = texture(context, &view);
-        Self { view: Arc::new(view), shown }
+        let texture = texture(context, &view);
+        Self { view: Arc::new(view), texture }
     }
 
-    /// Memory that it takes, bytes.
+    /// Memory size, bytes.
     pub(crate) fn bytes(&self) -> usize {
         let view = &self.view;
         size_of_val(view.goodness_percent.as_slice())
@@ -48,32 +48,32 @@ impl HazardRaster {
     }
 }
 
-/// First and last row, and first and last column, of the bounding box of the known cells; `None` where no cell is known.
-fn known_box(view: &HazardView) -> Option<[[usize; 2]; 2]> {
+/// First and last row, and first and last column, of the bounding box of the known cells; `None` if no cell is known.
+fn known_bounds(view: &HazardView) -> Option<[[usize; 2]; 2]> {
     let known = || (0..view.side * view.side).filter(|&index| view.goodness_percent[index] != UNKNOWN);
     let rows = [known().map(|index| index / view.side).min()?, known().map(|index| index / view.side).max()?];
     let columns = known().map(|index| index % view.side);
     Some([rows, [columns.clone().min()?, columns.max()?]])
 }
 
-/// The goodness of the cells of the bounding box as a picture: the first line is the northernmost row.
+/// The goodness of the cells of the bounding box as an image; the first line is the northernmost row.
 pub(crate) fn texels(view: &HazardView) -> Vec<i8> {
-    let Some([rows, columns]) = known_box(view) else { return Vec::new() };
+    let Some([rows, columns]) = known_bounds(view) else { return Vec::new() };
     let line =
         |row: usize| &view.goodness_percent[row * view.side + columns[0]..=row * view.side + columns[1]];
     (rows[0]..=rows[1]).rev().flat_map(line).copied().collect()
 }
 
 /// The texture of the bounding box of the known cells.
-fn texture(context: &Context, view: &HazardView) -> Option<Shown> {
-    let [rows, columns] = known_box(view)?;
+fn texture(context: &Context, view: &HazardView) -> Option<GoodnessTexture> {
+    let [rows, columns] = known_bounds(view)?;
     let [height, width] = [rows, columns].map(|[first, last]| last - first + 1);
     let colours: Vec<Color32> = texels(view).into_iter().map(theme::goodness).collect();
     let image = ColorImage::new([width, height], colours);
     let texture = context.load_texture("goodness map", image, TextureOptions::NEAREST);
     let middle =
         |corner_m: f64, [first, last]: [usize; 2]| corner_m + 0.5 * (first + last + 1) as f64 * view.cell_m;
-    Some(Shown {
+    Some(GoodnessTexture {
         texture,
         middle_m: [middle(view.corner_m[1], columns), middle(view.corner_m[0], rows)],
         size_m: [width, height].map(|cells| (cells as f64 * view.cell_m) as f32),
@@ -86,12 +86,12 @@ impl State {
         self.hazards_key().map_or(Slot::Absent, |key| self.cache.hazards(&key))
     }
 
-    /// Whether the navigator chose on a goodness map at the cursor's stop.
+    /// Whether the navigator used a goodness map at the cursor's stop.
     pub(crate) fn has_hazards(&self) -> bool {
         self.hazards_key().is_some()
     }
 
-    /// The name of the goodness map of the cursor's stop, where the navigator chose on one.
+    /// The cache key of the goodness map of the cursor's stop; `None` if the navigator used none.
     fn hazards_key(&self) -> Option<Key> {
         let step = self.cursor.step;
         self.cycle_at(step)?;
@@ -100,22 +100,22 @@ impl State {
         if !command.navigator.needs_map() {
             return None;
         }
-        // The exemption is around the target of the run that drives.
+        // The exempt area is around the target of the driving run.
         let by = [steering.target, steering.run];
         let rules = format!("{by:?} {:?} {}", command.hazard_cameras, command.exemption_radius_m);
         Some(Key::Hazards { session: self.session.as_ref()?.id.clone(), step, rules })
     }
 
-    /// The goodness map of the cursor's stop, where a panel shows it.
-    pub(crate) fn want_hazards(&self, keys: &mut Vec<Key>) {
+    /// Adds the goodness map of the cursor's stop if a visible panel shows it.
+    pub(crate) fn add_hazard_items(&self, keys: &mut Vec<Key>) {
         keys.extend(self.hazards_key().filter(|_| self.wants_hazards));
     }
 }
 
 /// Paints the goodness map of the cursor's stop.
 pub(crate) fn paint(plot: &mut PlotUi<'_>, state: &State) {
-    let Some(Shown { texture, middle_m: [east, north], size_m }) =
-        state.hazards().ready().and_then(|raster| raster.shown.as_ref())
+    let Some(GoodnessTexture { texture, middle_m: [east, north], size_m }) =
+        state.hazards().ready().and_then(|raster| raster.texture.as_ref())
     else {
         return;
     };
@@ -139,7 +139,7 @@ pub(crate) fn words_at(view: Option<&HazardView>, [east, north]: [f64; 2]) -> St
     }
 }
 
-/// The view of the goodness map of the cursor's stop, shared so that a label can keep it.
+/// The goodness map of the cursor's stop, shared so that a label can keep it.
 pub(crate) fn view(state: &State) -> Option<Arc<HazardView>> {
     state.hazards().ready().map(|raster| Arc::clone(&raster.view))
 }

@@ -1,4 +1,4 @@
-//! On the map: goal and planned path of the stop that is looked at, and the path by the wheels alone with its 3σ ellipses.
+//! On the map: goal and planned path of the cursor's stop, and the path by wheel odometry alone with its 3σ ellipses.
 
 use egui::{Color32, Stroke};
 use egui_plot::{Line, LineStyle, MarkerShape, PlotUi, Points, Polygon};
@@ -37,7 +37,7 @@ pub(crate) fn paint(plot: &mut PlotUi<'_>, state: &State) {
     }
 }
 
-/// The path by the wheels alone, with ellipses, and the ellipse of the estimate at the stop that is looked at.
+/// Draws the path by wheel odometry alone with ellipses, and the ellipse of the estimate at the cursor's stop.
 fn paint_wheels(plot: &mut PlotUi<'_>, state: &State) {
     let Some(drive) = state.drive() else { return };
     let places: Vec<[f64; 2]> = drive.cycles.iter().map(|cycle| at(&cycle.by_wheels)).collect();
@@ -53,14 +53,14 @@ fn paint_wheels(plot: &mut PlotUi<'_>, state: &State) {
     }
 }
 
-/// The 3σ ellipse of a place.
+/// Draws the 3σ ellipse of a position.
 fn paint_ellipse(plot: &mut PlotUi<'_>, place: &Reckoned, colour: Color32, width: f32) {
     let Some(points) = outline(place) else { return };
     let polygon = Polygon::new("", points).fill_color(Color32::TRANSPARENT).allow_hover(false);
     plot.polygon(polygon.stroke(Stroke::new(width, colour)));
 }
 
-/// The outline of the 3σ ellipse of a place, east and north, m; none where the place is known exactly.
+/// The outline of the 3σ ellipse of a position, east and north, m; `None` if its covariance is 0.
 fn outline(place: &Reckoned) -> Option<Vec<[f64; 2]>> {
     let [[xx, xy, _], [_, yy, _], _] = place.covariance;
     let outline = ellipse::outline(&Matrix2::new(yy, xy, xy, xx), 3.0).filter(|_| xx + yy > 0.0)?;

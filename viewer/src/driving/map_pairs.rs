@@ -1,4 +1,4 @@
-//! The stereo pairs that the hazard map of a drive is made from, as boxes to check.
+//! The stereo pairs of a drive's hazard map, as check boxes.
 
 use egui::{Checkbox, Ui};
 use sightline_rover::driving::{DriveCommand, HAZARD_CAMERAS_MAX};
@@ -9,7 +9,7 @@ use crate::theme;
 const HELP: &str = "The hazard map is made from the checked pairs, up to four. Without a check it is made from the first pair on the \
                     body that looks ahead.";
 
-/// Shows a box for every pair beside the main one, where the navigator needs a map.
+/// Shows a check box for every pair in addition to the main one, if the navigator needs a map.
 pub(super) fn field(ui: &mut Ui, state: &State, command: &mut DriveCommand) {
     if !command.navigator.needs_map() {
         return;
@@ -17,7 +17,7 @@ pub(super) fn field(ui: &mut Ui, state: &State, command: &mut DriveCommand) {
     let cameras = state.stop().map(|stop| stop.cameras.as_slice()).unwrap_or_default();
     let mut names: Vec<_> =
         cameras.iter().filter(|camera| camera.right_size.is_some()).map(|camera| camera.name).collect();
-    // A pair of another drive can be unchecked here.
+    // A pair that only another drive has can be unchecked here.
     names.extend(command.hazard_cameras.iter().filter(|&name| !cameras.iter().any(|c| c.name == *name)));
     if names.is_empty() {
         return;
@@ -44,7 +44,7 @@ mod tests {
     use sightline_rover::driving::NavigatorKind;
 
     use crate::command::Command;
-    use crate::driving::{Ask, panel};
+    use crate::driving::{DrivingCommand, panel};
     use crate::tests::{Shown, fixture};
 
     const CAMERAS: [(&str, bool); 3] = [("front_hazcam", true), ("left_wedge", true), ("mono", false)];
@@ -72,7 +72,7 @@ mod tests {
 
     fn after_click(checked: &'static [&'static str], name: &str) -> Vec<String> {
         let asked = form(NavigatorKind::Gestalt, checked).click(name);
-        let [Command::Drive(Ask::Form(command))] = asked.as_slice() else { panic!("{asked:?}") };
+        let [Command::Drive(DrivingCommand::Form(command))] = asked.as_slice() else { panic!("{asked:?}") };
         command.hazard_cameras.iter().map(ToString::to_string).collect()
     }
 

@@ -1,4 +1,4 @@
-//! Driving on commands: the form of the command, the drive as the server has it, and the panel that shows both.
+//! Commanded drives: the command form, the drive as reported by the server, and the panel that shows both.
 
 pub(crate) mod data_flow;
 pub(crate) mod faults;
@@ -11,7 +11,7 @@ pub(crate) mod panel;
 pub(crate) mod paths;
 pub(crate) mod pause;
 pub(crate) mod stages;
-pub(crate) mod tried;
+pub(crate) mod trial_drives;
 pub(crate) mod update;
 pub(crate) mod visits;
 pub(crate) mod why;
@@ -24,55 +24,55 @@ use sightline_session::faults::NewFault;
 /// The drive of the open session.
 #[derive(Clone, Debug, Default)]
 pub struct Driving {
-    /// The command as it stands in the form.
+    /// The command in the form.
     pub command: DriveCommand,
-    /// The targets to which the rover drives afterwards, as they stand in the form, by their numbers.
+    /// Numbers of the targets to visit afterwards, in the form.
     pub then: Vec<usize>,
     /// The faults to be injected into the next drive or branch.
     pub faults: Vec<NewFault>,
-    /// The pause as it stands in the form.
+    /// The pause in the form.
     pub pause: pause::PauseForm,
-    /// The drive with the name of its session; `None` before it was read.
+    /// The drive, with the name of its session; `None` until read.
     pub view: Option<(String, DriveView)>,
-    /// The whole drives that are tried in the background, of all sessions.
-    pub tried: Vec<tried::TriedDrive>,
-    /// The cursor's stop, and the one to which it goes with the rover once the page knows it.
+    /// The trial drives in the background, of all sessions.
+    pub trials: Vec<trial_drives::TrialDrive>,
+    /// The cursor's stop, and the stop to which it follows the rover once that is loaded.
     following: Option<[usize; 2]>,
-    is_asked: bool,
+    is_pending: bool,
     is_stale: bool,
     is_beginning: bool,
 }
 
-/// What a person asks for about driving.
+/// A command about driving.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Ask {
+pub enum DrivingCommand {
     /// Changes the command in the form.
     Form(DriveCommand),
     /// Changes the targets that are visited afterwards.
     Then(Vec<usize>),
     /// Changes the faults to be injected into the next drive or branch.
     Faults(Vec<NewFault>),
-    /// Begins a drive with the run that is looked at: from the first stop, or as a branch at the cursor's stop.
+    /// Starts a drive with the selected run: from the first stop, or as a branch at the cursor's stop.
     Begin,
     /// Changes the pause in the form.
     PauseForm(pause::PauseForm),
-    /// Lets the drive wait at the chosen stage of its present stop.
+    /// Pauses the drive at the chosen stage of its current stop.
     Pause,
-    /// Goes on to the chosen pause with the run that is looked at.
+    /// Continues to the chosen pause with the selected run.
     Continue,
-    /// Computes one stage more with the run that is looked at.
+    /// Computes one more stage with the selected run.
     NextStage,
     /// Drives one stop further.
     OneStop,
-    /// Drives on with the run that is looked at, under the command in the form.
+    /// Continues the drive with the selected run, under the command in the form.
     GoOn,
-    /// Tries the whole drive again under another command, in the background.
+    /// Drives the whole drive again under another command, in the background.
     Try {
         /// The command.
         command: DriveCommand,
-        /// Its change in words, by which the drive is known.
+        /// Description of the change, which identifies the trial drive.
         change: String,
     },
-    /// Ends the drive that is tried with a change and removes its session.
-    CancelTried(String),
+    /// Ends the trial drive with a change and removes its session.
+    CancelTrial(String),
 }

@@ -1,15 +1,15 @@
-//! The text field for the motions of a directed drive. The text is parsed while it is typed; errors are shown below it.
+//! The text field for the motions of a directed drive. The text is parsed as it is entered; errors are shown below it.
 
 use egui::{Id, TextEdit, Ui};
 use sightline_rover::driving::{DriveCommand, Motion};
 
 use crate::theme;
 
-/// The field.
+/// Shows the field.
 pub(super) fn field(ui: &mut Ui, command: &mut DriveCommand) {
     let id = Id::unique("motions of the drive");
     let typed = ui.data(|data| data.get_temp::<String>(id));
-    // The typed text is kept until the command gets other motions.
+    // Keep the entered text until the command has other motions.
     let is_own = |typed: &String| read(typed).map_or(true, |motions| motions == command.motions);
     let mut text = typed.filter(is_own).unwrap_or_else(|| written(&command.motions));
     let help = "Motions to drive one after the other instead of those to the goal: metres (0.5), turn and degrees (turn 20), or both \

@@ -1,4 +1,4 @@
-//! The panel “Drive”: the command, the buttons that drive, and the decision at every stop.
+//! The panel “Drive”: the command, the buttons to drive, and the decision at every stop.
 
 use egui::{Button, CollapsingHeader, ComboBox, DragValue, Grid, Label, Response, RichText, ScrollArea, Ui};
 use sightline_rover::driving::{
@@ -10,13 +10,13 @@ use sightline_session::pause::PauseSide;
 use sightline_track::cycle_stage::CycleStage;
 
 use crate::command::{Command, Go};
-use crate::driving::{Ask, faults, map_pairs, motions, pause, visits, why, words};
+use crate::driving::{DrivingCommand, faults, map_pairs, motions, pause, visits, why, words};
 use crate::panels::digits;
 use crate::panels::panel::Panel;
 use crate::state::{State, run_letter};
 use crate::{panels, theme};
 
-/// The first limit of refused motions in the form.
+/// Initial limit of refused motions in the form.
 const REFUSALS: u32 = 3;
 
 /// The panel “Drive”.
@@ -61,7 +61,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     });
 }
 
-/// The command as it can be changed.
+/// Shows the form of the command.
 fn form(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let mut command = state.driving.command.clone();
     ui.horizontal_wrapped(|ui| {
@@ -112,7 +112,7 @@ fn form(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             limits(ui, state, &mut command);
         });
     if command != state.driving.command {
-        out.push(Command::Drive(Ask::Form(command)));
+        out.push(Command::Drive(DrivingCommand::Form(command)));
     }
 }
 
@@ -160,7 +160,7 @@ fn limits(ui: &mut Ui, state: &State, command: &mut DriveCommand) {
     });
 }
 
-/// What the rover does after arrival: an approach, looks, and the hand-off, in this order.
+/// Shows the actions after arrival, in this order: an approach, looks, and the hand-off.
 fn arrival(ui: &mut Ui, command: &mut DriveCommand) {
     let has = |action| command.on_arrival.contains(&action);
     let mut looks = command.on_arrival.iter().filter(|action| **action == ArrivalAction::Look).count();
@@ -181,7 +181,7 @@ fn arrival(ui: &mut Ui, command: &mut DriveCommand) {
          surface there; it needs hazcams at every stop.",
     );
     if hands_off && !before.2 {
-        // The surface of a look is registered best.
+        // Registration works best with the mesh of a look.
         looks = looks.max(1);
     }
     if (approaches, looks, hands_off) != before {
@@ -191,7 +191,7 @@ fn arrival(ui: &mut Ui, command: &mut DriveCommand) {
     }
 }
 
-/// Whether refused motions end the drive, and how many in a row.
+/// Shows whether refused motions end the drive, and the maximum number in a row.
 fn refusals(ui: &mut Ui, command: &mut DriveCommand) {
     let mut ends = command.refusals_max.is_some();
     ui.checkbox(&mut ends, "stop when odometry refuses").on_hover_text(
@@ -211,7 +211,7 @@ fn number(ui: &mut Ui, name: &str, unit: &str, value: &mut f64, (low, high): (f6
     ui.add(drag.prefix(format!("{name} ")).suffix(unit)).accessible_name(name).on_hover_text(help);
 }
 
-/// The button that begins a drive, or the sentence that says why there is none.
+/// Shows the button that starts a drive, or why none can be started.
 fn begin(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let is_simulated = state.traverse.as_ref().is_some_and(|traverse| traverse.simulated);
     if !is_simulated {
@@ -225,7 +225,7 @@ fn begin(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         .on_hover_text("Begins a drive from the first stop, in a session of its own")
         .clicked()
     {
-        out.push(Command::Drive(Ask::Begin));
+        out.push(Command::Drive(DrivingCommand::Begin));
     }
     let sentence = format!(
         "This session replays a drive that was planned beforehand. “Drive” sends the rover from the first stop towards the target \
@@ -234,7 +234,7 @@ fn begin(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ui.add(Label::new(theme::note(sentence)).wrap());
 }
 
-/// The pause as it can be chosen: side, stage, and stops.
+/// Shows the choice of the pause: side, stage, and stops.
 fn pause_form(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let mut form = state.driving.pause;
     ui.horizontal_wrapped(|ui| {
@@ -247,11 +247,11 @@ fn pause_form(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         choice(ui, "stops of the pause", 120.0, [true, false], &mut form.is_every_stop, stops);
     });
     if form != state.driving.pause {
-        out.push(Command::Drive(Ask::PauseForm(form)));
+        out.push(Command::Drive(DrivingCommand::PauseForm(form)));
     }
 }
 
-/// A list of values from which one is chosen.
+/// Shows a combo box of values.
 fn choice<T: Copy + PartialEq, const N: usize>(
     ui: &mut Ui,
     name: &str,
@@ -271,27 +271,27 @@ fn choice<T: Copy + PartialEq, const N: usize>(
     shown.response.accessible_name(name)
 }
 
-/// Whether the motion at a stop is not chosen yet, because the drive is paused before that.
+/// Whether the motion at a stop is not chosen yet, because the drive is paused earlier.
 fn is_undecided(drive: &DriveView, step: usize) -> bool {
     drive.paused.is_some_and(|halt| halt.stop == step && halt.before <= CycleStage::SelectPath)
 }
 
-/// What can be done with a drive.
+/// Shows the buttons of a drive.
 fn buttons(ui: &mut Ui, state: &State, drive: &DriveView, out: &mut Vec<Command>) {
     let has_ended = drive.cycles.last().is_some_and(|cycle| cycle.ending.is_some());
     let is_driver = drive.steering.as_ref().is_some_and(|steering| {
         state.cursor.target == Some(steering.target) && state.cursor.run == steering.run
     });
     let is_other_command = drive.steering.as_ref().is_some_and(|steering| {
-        // The server puts the waiting targets there.
+        // The server adds the waiting targets to the command.
         let waiting = steering.command.waiting.clone();
         let form = DriveCommand { waiting, ..state.driving.command.clone() };
         steering.command != form || steering.then != state.driving.then
     });
     ui.horizontal_wrapped(|ui| {
-        let mut button = |name: &str, is_on: bool, help: &str, ask: Ask| {
+        let mut button = |name: &str, is_on: bool, help: &str, command: DrivingCommand| {
             if ui.add_enabled(is_on, Button::new(name)).on_hover_text(help).clicked() {
-                out.push(Command::Drive(ask));
+                out.push(Command::Drive(command));
             }
         };
         if drive.is_driving {
@@ -299,32 +299,32 @@ fn buttons(ui: &mut Ui, state: &State, drive: &DriveView, out: &mut Vec<Command>
                 "Pause",
                 true,
                 "The drive waits at the chosen stage of the present stop, or of the next one that it comes to",
-                Ask::Pause,
+                DrivingCommand::Pause,
             );
         } else {
             let is_paused = drive.paused.is_some();
-            button("Continue", is_paused, "Goes on to the chosen pause; without one ahead it drives on", Ask::Continue);
-            button("Next stage", is_paused, "Computes the next stage and waits after it", Ask::NextStage);
+            button("Continue", is_paused, "Goes on to the chosen pause; without one ahead it drives on", DrivingCommand::Continue);
+            button("Next stage", is_paused, "Computes the next stage and waits after it", DrivingCommand::NextStage);
             let goes_on = !has_ended || is_other_command || !is_driver;
             let name = if is_driver {
                 "Drive on".to_owned()
             } else {
                 format!("Drive on with run {}", run_letter(state.cursor.run))
             };
-            button(&name, goes_on, "Drives on from the last stop under this command", Ask::GoOn);
-            button("One stop", goes_on, "Drives to the next stop and waits there", Ask::OneStop);
+            button(&name, goes_on, "Drives on from the last stop under this command", DrivingCommand::GoOn);
+            button("One stop", goes_on, "Drives to the next stop and waits there", DrivingCommand::OneStop);
         }
         let branch = format!("Branch at stop {}", state.cursor.step);
         button(
             &branch,
             true,
             "Drives from the stop that is looked at, in a world and a session of its own",
-            Ask::Begin,
+            DrivingCommand::Begin,
         );
     });
 }
 
-/// Where the drive stands.
+/// Shows the state of the drive.
 fn standing(ui: &mut Ui, drive: &DriveView) {
     let ending = drive.cycles.last().and_then(|cycle| cycle.ending.as_ref());
     let (text, colour) = match (ending, drive.is_driving, drive.paused) {
@@ -339,7 +339,7 @@ fn standing(ui: &mut Ui, drive: &DriveView) {
     }
 }
 
-/// One line a stop.
+/// Shows the decisions, one line per stop.
 fn decisions(ui: &mut Ui, state: &State, drive: &DriveView, out: &mut Vec<Command>) {
     Grid::new("decisions").num_columns(6).striped(true).spacing([12.0, 2.0]).show(ui, |ui| {
         for head in ["stop", "slip on the way", "to the goal", "motion", "reported", "on Mars"] {
@@ -361,7 +361,7 @@ fn decisions(ui: &mut Ui, state: &State, drive: &DriveView, out: &mut Vec<Comman
                 (Some(motion), _) => words::motion(motion),
                 (None, Some(ending)) => ending.reason.word().to_owned(),
                 (None, None) if is_undecided(drive, cycle.step) => "not chosen yet".to_owned(),
-                (None, None) => visits::look(state, cycle),
+                (None, None) => visits::mast_action(state, cycle),
             };
             ui.label(theme::label(motion).size(12.0));
             ui.label(theme::number(words::report(cycle)));

@@ -1,4 +1,4 @@
-//! The paths that a navigator considered at a stop: on the map, coloured by their votes, and as a table.
+//! The paths that a navigator evaluated at a stop: on the map, coloured by their votes, and as a table.
 
 use egui::{Grid, ScrollArea, Ui};
 use egui_plot::{Line, LineStyle, MarkerShape, PlotUi, Points};
@@ -10,7 +10,7 @@ use crate::panels::numbers::fixed;
 use crate::state::State;
 use crate::theme;
 
-/// Paints the route, every path that was considered, and the first failing cell of each vetoed one.
+/// Paints the route, every evaluated path, and the first failing cell of each vetoed one.
 pub(crate) fn paint(plot: &mut PlotUi<'_>, state: &State, site_from_rover: &Pose) {
     let Some(choice) = state.cycle_at(state.cursor.step).and_then(|cycle| cycle.choice.as_ref()) else {
         return;
@@ -35,12 +35,12 @@ pub(crate) fn paint(plot: &mut PlotUi<'_>, state: &State, site_from_rover: &Pose
     plot.points(Points::new("", failing).color(theme::failed()).radius(3.0).shape(MarkerShape::Cross));
 }
 
-/// The colour of a path: that of its vote, or of a veto.
+/// The colour of a path, by its vote or its veto.
 fn colour(candidate: &Candidate) -> egui::Color32 {
     if candidate.veto.is_some() { theme::failed() } else { theme::score(candidate.vote as f32) }
 }
 
-/// One row a path: its vote by term, or the first failing cell.
+/// Shows one row per path: its vote by term, or the first failing cell.
 pub(crate) fn table(ui: &mut Ui, choice: &PathChoice) {
     let count = choice.candidates.len();
     let open = count - choice.vetoed_count();

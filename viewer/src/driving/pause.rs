@@ -1,5 +1,5 @@
-//! Pauses of a commanded drive before or after a stage: the choice in the form, the place where the drive waits, and the steps that
-//! change when it goes on.
+//! Pauses of a commanded drive before or after a stage: the form, the current pause, and the records to discard when the
+//! drive continues.
 
 use sightline_session::compare::RunName;
 use sightline_session::driving::Steering;
@@ -11,12 +11,12 @@ use crate::cache::Key;
 use crate::command::Stage;
 use crate::state::State;
 
-/// The pause as it is chosen in the panel.
+/// The pause in the form.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PauseForm {
     /// The side and the stage.
     pub pause: StagePause,
-    /// Whether the drive waits there at every stop; at one stop only otherwise.
+    /// Whether the drive pauses at every stop; otherwise at one stop only.
     pub is_every_stop: bool,
 }
 
@@ -28,26 +28,26 @@ impl Default for PauseForm {
 }
 
 impl PauseForm {
-    /// The pause in a command; `None`: before `drive`, which need not be said.
-    pub(super) fn told(self) -> Option<StagePause> {
+    /// The pause to send in a command; `None` for the default, before `drive`.
+    pub(super) fn to_request(self) -> Option<StagePause> {
         (self.pause != Self::default().pause).then_some(self.pause)
     }
 
-    /// The next pause of a drive that waits, as the stop of the command; `None`: it drives on.
+    /// The stop of the next pause of a paused drive, for the command; `None`: it drives on without a pause.
     pub(super) fn next_stop(self, here: Halt) -> Option<usize> {
         let stops = here.stop..=here.stop + usize::from(self.is_every_stop);
         stops.into_iter().find(|stop| self.pause.at(*stop) > here)
     }
 }
 
-/// A command that is given at a pause, with its next one.
+/// The steering with its next pause at `halt`.
 pub(super) fn until(steering: Steering, halt: Halt) -> Steering {
     let pause = StagePause { when: PauseSide::Before, stage: halt.before };
     Steering { pause_at: Some(halt.stop), pause: Some(pause), ..steering }
 }
 
 impl State {
-    /// The place at which the drive of the open session waits.
+    /// Where the drive of the open session is paused.
     pub(crate) fn halt(&self) -> Option<Halt> {
         self.drive()?.paused
     }
@@ -59,18 +59,18 @@ impl State {
             return Some(before);
         }
         let before = self.halt().filter(|halt| halt.stop == step)?.before;
-        // A step is whole before the last three stages, and without a row before the first one.
+        // A complete row lacks only stages after `update`; without a row, all stages are missing.
         let is_here = if row.is_some() { before > CycleStage::Update } else { before == CycleStage::Predict };
         is_here.then_some(before)
     }
 
-    /// Whether a stop has no images, because the drive is paused before they are taken.
+    /// Whether a stop has no images because the drive is paused before their capture.
     pub(crate) fn lacks_images_yet(&self, step: usize) -> bool {
         self.halt().is_some_and(|halt| halt.stop == step && halt.before <= CycleStage::Capture)
     }
 
-    /// Whether a run waits with its drive.
-    pub(crate) fn is_held(&self, run: &RunView) -> bool {
+    /// Whether a run is paused with its drive.
+    pub(crate) fn is_paused(&self, run: &RunView) -> bool {
         let is_next = |row: &sightline_session::step::StepRow| {
             row.paused_before.is_some()
                 || self.halt() == Some(Halt { stop: row.step + 1, before: CycleStage::Predict })
@@ -78,18 +78,18 @@ impl State {
         run.rows.last().is_some_and(is_next)
     }
 
-    /// Why a stage is missing, where the drive is paused before it; `None` elsewhere.
+    /// Why a stage is missing, if the drive is paused before it; otherwise `None`.
     pub(crate) fn missing_by_pause(&self, step: usize) -> Option<String> {
         let before = self.paused_before(step).filter(|before| *before <= CycleStage::Update)?;
         let located = self.trace_at(step).ready().and_then(|trace| trace.located());
-        // A located stage without a result says why by itself.
+        // A located stage without a result contains its own explanation.
         if before > CycleStage::Locate && located.is_some_and(|located| located.missing.is_some()) {
             return None;
         }
         Some(not_computed(before))
     }
 
-    /// Whether a stage that only a drive has is done at the cursor's stop.
+    /// Whether a stage that only a drive has is complete at the cursor's stop.
     pub(crate) fn is_decided(&self, stage: Stage) -> bool {
         let step = self.cursor.step;
         let is_before = self.paused_before(step).is_none_or(|before| stage.in_cycle() < before);
@@ -98,17 +98,17 @@ impl State {
         is_before && self.cycle_at(step).is_some_and(has_driven)
     }
 
-    /// Forgets the records of steps that were paused when they were read and have more stages now.
+    /// Discards the records of steps that were paused when they were read and have had further stages computed since.
     pub(crate) fn forget_begun_steps(&mut self) {
-        let open = self.session_id();
+        let open = self.session.as_ref().map(|session| session.id.clone());
         for (key, before) in self.cache.begun() {
             let run = self.run_named(RunName { target: key.target, run: key.run }).map(|(_, run)| run);
             let row = run.and_then(|run| run.rows.iter().rev().find(|row| row.step == key.step));
             let has_more = row.is_some_and(|row| row.paused_before.is_none_or(|now| now > before));
             if has_more && open.as_ref() == Some(&key.session) {
-                self.cache.forget(|kept| match kept {
-                    Key::Trace(kept) | Key::Array(kept, _) | Key::Arrays(kept) => *kept == key,
-                    Key::EarlierTemplates(kept) | Key::Times(kept) => *kept == key,
+                self.cache.forget(|cached| match cached {
+                    Key::Trace(of) | Key::Array(of, _) | Key::Arrays(of) => *of == key,
+                    Key::EarlierTemplates(of) | Key::Times(of) => *of == key,
                     Key::Image { .. } | Key::Stop { .. } | Key::Odometry { .. } | Key::Hazards { .. } => {
                         false
                     }
@@ -117,7 +117,7 @@ impl State {
         }
     }
 
-    /// Forgets the cameras of a stop whose mast was not pointed when they were read.
+    /// Discards the cameras of a stop whose mast was not pointed when they were read.
     pub(super) fn forget_unpointed(&mut self, before: Option<Halt>) {
         let Some(halt) = before.filter(|halt| halt.before <= CycleStage::PointMast) else { return };
         if self.halt() != before {
@@ -126,7 +126,7 @@ impl State {
     }
 }
 
-/// Why a stage is not there at a pause, and how to get it.
+/// The explanation of a stage that is missing because of a pause, and how to compute it.
 pub(crate) fn not_computed(before: CycleStage) -> String {
     format!(
         "Not computed yet: the drive is paused before `{}`. “Next stage” or “Continue” in the panel Drive goes on.",
@@ -134,7 +134,7 @@ pub(crate) fn not_computed(before: CycleStage) -> String {
     )
 }
 
-/// The place of a pause in words.
+/// A description of a pause.
 pub(super) fn in_words(halt: Halt) -> String {
     let (stop, before) = (halt.stop, halt.before.word());
     match halt.before.previous() {
@@ -164,7 +164,7 @@ mod tests {
         // After `drive` is before `predict` of the next stop.
         assert_eq!(form(PauseSide::After, Drive, true).next_stop(here(Predict)), Some(3));
         assert_eq!(PauseForm::default().next_stop(here(Drive)), Some(4));
-        assert_eq!((PauseForm::default().told(), every.told()), (None, Some(every.pause)));
+        assert_eq!((PauseForm::default().to_request(), every.to_request()), (None, Some(every.pause)));
     }
 
     #[test]

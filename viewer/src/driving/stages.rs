@@ -57,7 +57,7 @@ fn missing(state: &State, stage: Stage) -> String {
     }
 }
 
-/// The values of a stage, each with its name and unit.
+/// The values of a stage: name, and value with unit.
 fn record(state: &State, cycle: &Cycle, stage: Stage) -> Vec<(&'static str, String)> {
     match stage {
         Stage::SET_GOAL => goal(cycle),
@@ -83,7 +83,7 @@ fn motion(state: &State, cycle: &Cycle) -> Vec<(&'static str, String)> {
     let mut rows = match (&cycle.motion, &cycle.ending) {
         (Some(motion), _) => vec![("motion", words::motion(motion))],
         (None, Some(ending)) => vec![("the drive ends", words::ending(ending))],
-        (None, None) => vec![("motion", format!("none: the rover {}", visits::look(state, cycle)))],
+        (None, None) => vec![("motion", format!("none: the rover {}", visits::mast_action(state, cycle)))],
     };
     match cycle.motion {
         Some(Motion::Arc { length_m, curvature_per_m }) => {

@@ -1,4 +1,4 @@
-//! Reads the drive of the open session, and sends what a person asks for.
+//! Reads the drive of the open session, and sends the user's commands.
 
 use sightline_api::endpoint::Call;
 use sightline_api::endpoints::{BeginDrive, ShowDrive, SteerDrive};
@@ -8,18 +8,18 @@ use sightline_rover::driving::Cycle;
 use sightline_session::driving::{DriveView, Steering};
 use sightline_session::pause::Halt;
 
-use crate::driving::Ask;
+use crate::driving::DrivingCommand;
 use crate::driving::pause::{self, PauseForm};
 use crate::state::State;
 use crate::state::calls::Notice;
 
 impl State {
-    /// Whether the open session drives on commands.
+    /// Whether the open session is a commanded drive.
     pub(crate) fn is_on_commands(&self) -> bool {
         self.session.as_ref().is_some_and(|session| session.steering.is_some())
     }
 
-    /// The drive of the open session; `None` before it was read.
+    /// The drive of the open session; `None` until read.
     pub(crate) fn drive(&self) -> Option<&DriveView> {
         let open = &self.session.as_ref()?.id;
         self.driving.view.as_ref().filter(|(session, _)| session == open).map(|(_, view)| view)
@@ -30,7 +30,7 @@ impl State {
         self.drive()?.cycles.iter().find(|cycle| cycle.step == step)
     }
 
-    /// Distances to the goal at the last decided stop and where the rover was sent there, m; `None` for a run that does not drive.
+    /// Distances to the goal, m: at the last decided stop, and at the start of the command. `None` unless the run drives.
     pub(crate) fn way_left_m(&self, (target, run): (usize, usize)) -> Option<[f64; 2]> {
         let drive = self.drive()?;
         let is_driver = |steering: &&Steering| (steering.target, steering.run) == (target, run);
@@ -39,7 +39,7 @@ impl State {
         Some([drive.cycles.last()?.goal.distance_m, first.goal.distance_m])
     }
 
-    /// How the drive stands, in a word; `None` where nobody drives.
+    /// The state of the drive as a word; `None` without a drive.
     pub(crate) fn drive_word(&self) -> Option<&'static str> {
         let drive = self.drive()?;
         Some(match drive.cycles.last().and_then(|cycle| cycle.ending.as_ref()) {
@@ -49,39 +49,39 @@ impl State {
         })
     }
 
-    /// Notes that the drive has gone on.
-    pub(crate) fn drive_went_on(&mut self) {
+    /// Records that the drive has advanced.
+    pub(crate) fn mark_drive_stale(&mut self) {
         self.driving.is_stale = true;
     }
 
-    /// Reads the drive when it has gone on.
+    /// Reads the drive if it has advanced.
     pub(crate) fn sync_driving(&mut self) {
         self.follow_rover();
         let Some(session) = self.session.as_ref().filter(|session| session.steering.is_some()) else {
             return;
         };
         let is_known = self.drive().is_some();
-        if self.driving.is_asked || (is_known && !self.driving.is_stale) {
+        if self.driving.is_pending || (is_known && !self.driving.is_stale) {
             return;
         }
-        (self.driving.is_asked, self.driving.is_stale) = (true, false);
+        (self.driving.is_pending, self.driving.is_stale) = (true, false);
         let id = session.id.clone();
         let call = Call::to::<ShowDrive>(&AtSession { session: id.clone() });
         self.call_or::<ShowDrive>(
             call,
             move |state, view| {
-                state.driving.is_asked = false;
-                state.took_drive(id, view);
+                state.driving.is_pending = false;
+                state.on_drive_reply(id, view);
             },
             |state, _| {
-                state.driving.is_asked = false;
+                state.driving.is_pending = false;
                 Notice::List
             },
         );
     }
 
-    /// Takes the drive in; a cursor at the rover's last stop goes with the rover.
-    pub(crate) fn took_drive(&mut self, session: String, view: DriveView) {
+    /// Stores the drive; a cursor at the rover's last stop follows the rover.
+    pub(crate) fn on_drive_reply(&mut self, session: String, view: DriveView) {
         let newest = |view: &DriveView| {
             let paused = view.paused.map(|halt| halt.stop);
             view.cycles.last().map(|cycle| cycle.step).max(paused)
@@ -95,11 +95,11 @@ impl State {
             |view: &DriveView| view.steering.as_ref().map(|steering| (steering.target, steering.run));
         let is_next = !is_other && self.drive().and_then(driver) != driver(&view);
         if let Some(steering) = view.steering.as_ref().filter(|_| is_next) {
-            // The rover was sent to the next target: whoever looks at the one that it drove to goes with it.
+            // The rover was sent to the next target: if its previous target was selected, select the next one.
             self.driving.command.since = steering.command.since;
             self.driving.then.clone_from(&steering.then);
-            let looked_at = self.cursor.target.map(|target| (target, self.cursor.run));
-            if looked_at == self.drive().and_then(driver) {
+            let selected = self.cursor.target.map(|target| (target, self.cursor.run));
+            if selected == self.drive().and_then(driver) {
                 (self.cursor.target, self.cursor.run) = (Some(steering.target), steering.run);
             }
         }
@@ -120,7 +120,7 @@ impl State {
         self.follow_rover();
     }
 
-    /// Moves the cursor to the rover's stop once its images are known, unless the person went elsewhere.
+    /// Moves the cursor to the rover's stop once that is loaded, unless the user moved it elsewhere.
     fn follow_rover(&mut self) {
         let Some([from, to]) = self.driving.following else { return };
         if self.cursor.step != from {
@@ -132,38 +132,44 @@ impl State {
     }
 
     /// Applies a command of the panel.
-    pub(crate) fn ask_of_driving(&mut self, ask: Ask) {
-        match ask {
-            Ask::Form(command) => self.driving.command = command,
-            Ask::Then(then) => self.driving.then = then,
-            Ask::Faults(faults) => self.driving.faults = faults,
-            Ask::PauseForm(form) => self.driving.pause = form,
-            Ask::Begin => self.begin_drive(),
-            Ask::Pause => {
-                let (stop, pause) = (self.last_stop(), self.driving.pause.told());
+    pub(crate) fn apply_driving_command(&mut self, command: DrivingCommand) {
+        match command {
+            DrivingCommand::Form(command) => self.driving.command = command,
+            DrivingCommand::Then(then) => self.driving.then = then,
+            DrivingCommand::Faults(faults) => self.driving.faults = faults,
+            DrivingCommand::PauseForm(form) => self.driving.pause = form,
+            DrivingCommand::Begin => self.begin_drive(),
+            DrivingCommand::Pause => {
+                let (stop, pause) = (self.last_stop(), self.driving.pause.to_request());
                 self.steer(self.steered().map(|steering| Steering { pause_at: stop, pause, ..steering }));
             }
-            Ask::OneStop => {
+            DrivingCommand::OneStop => {
                 let next = self.last_stop().map(|stop| stop + 1);
-                self.steer(self.looked_at().map(|steering| Steering { pause_at: next, ..steering }));
+                self.steer(self.selected_steering().map(|steering| Steering { pause_at: next, ..steering }));
             }
-            Ask::Continue => {
+            DrivingCommand::Continue => {
                 let form = self.driving.pause;
                 let stop = self.halt().and_then(|here| form.next_stop(here));
-                let pause = form.told().filter(|_| stop.is_some());
-                self.steer(self.looked_at().map(|steering| Steering { pause_at: stop, pause, ..steering }));
+                let pause = form.to_request().filter(|_| stop.is_some());
+                self.steer(self.selected_steering().map(|steering| Steering {
+                    pause_at: stop,
+                    pause,
+                    ..steering
+                }));
             }
-            Ask::NextStage => {
+            DrivingCommand::NextStage => {
                 let next = self.halt().map(Halt::next);
-                self.steer(self.looked_at().zip(next).map(|(steering, next)| pause::until(steering, next)));
+                self.steer(
+                    self.selected_steering().zip(next).map(|(steering, next)| pause::until(steering, next)),
+                );
             }
-            Ask::GoOn => self.steer(self.looked_at()),
-            Ask::Try { command, change } => self.try_drive(command, change),
-            Ask::CancelTried(change) => self.cancel_tried_drive(change),
+            DrivingCommand::GoOn => self.steer(self.selected_steering()),
+            DrivingCommand::Try { command, change } => self.begin_trial_drive(command, change),
+            DrivingCommand::CancelTrial(change) => self.cancel_trial_drive(change),
         }
     }
 
-    /// The stop at which the rover stands: the drive may be known further than the session.
+    /// The rover's current stop; the drive may be ahead of the session.
     fn last_stop(&self) -> Option<usize> {
         let listed = self.session.as_ref()?.stop_count.checked_sub(1);
         let decided = self.drive().and_then(|drive| drive.cycles.last()).map(|cycle| cycle.step);
@@ -175,8 +181,8 @@ impl State {
         self.drive()?.steering.clone()
     }
 
-    /// The run that is looked at as the one that drives.
-    fn looked_at(&self) -> Option<Steering> {
+    /// The selected run as the driving one.
+    fn selected_steering(&self) -> Option<Steering> {
         let (target, run) = (self.target()?.number, self.run()?.number);
         let (command, mut then) = (self.driving.command.clone(), self.driving.then.clone());
         then.retain(|later| *later != target);
@@ -189,7 +195,7 @@ impl State {
             return;
         };
         let call = Call::with_body::<SteerDrive>(&AtSession { session: session.clone() }, &steering);
-        self.call::<SteerDrive>(call, move |state, view| state.took_drive(session, view));
+        self.call::<SteerDrive>(call, move |state, view| state.on_drive_reply(session, view));
     }
 
     fn begin_drive(&mut self) {
@@ -197,7 +203,7 @@ impl State {
             self.messages.note("The world of the drive is still being made.");
             return;
         }
-        let (Some(steering), Some(session)) = (self.looked_at(), self.session_id()) else {
+        let (Some(steering), Some(session)) = (self.selected_steering(), self.session_id()) else {
             self.messages.problem("There is no run to drive with: pick a target first.", None);
             return;
         };
@@ -274,10 +280,10 @@ mod tests {
     #[test]
     fn one_stop_more_counts_from_the_stop_that_the_drive_has_come_to() {
         let mut state = driving(1);
-        state.took_drive("s1".to_owned(), view(9, false));
+        state.on_drive_reply("s1".to_owned(), view(9, false));
         assert_eq!(state.session.as_ref().unwrap().stop_count, 6, "the session is read later");
         state.take_requests();
-        state.perform(Command::Drive(Ask::OneStop));
+        state.perform(Command::Drive(DrivingCommand::OneStop));
         let (_, body) = calls_of(&mut state).remove(0);
         assert_eq!(body.unwrap()["pause_at"], 9);
     }
@@ -287,9 +293,9 @@ mod tests {
         let mut state = driving(5);
         let words = |state: &State| state.next_step_words("for the next match");
         assert_eq!(words(&state), " This drive has no further stop.");
-        state.took_drive("s1".to_owned(), view(2, true));
+        state.on_drive_reply("s1".to_owned(), view(2, true));
         assert_eq!(words(&state), " The rover drives; its next stop is added here.");
-        state.took_drive("s1".to_owned(), view(2, false));
+        state.on_drive_reply("s1".to_owned(), view(2, false));
         assert_eq!(words(&state), " The rover waits; continue in the panel Drive.");
     }
 
@@ -298,11 +304,11 @@ mod tests {
         let mut state = driving(1);
         assert_eq!(calls_of(&mut state), [("sessions/s1/drive".to_owned(), None)]);
         assert_eq!(calls_of(&mut state), [], "it is asked for once");
-        state.driving.is_asked = false;
-        state.took_drive("s1".to_owned(), view(2, true));
+        state.driving.is_pending = false;
+        state.on_drive_reply("s1".to_owned(), view(2, true));
         assert_eq!(state.driving.command.standoff_m, 1.5, "the form shows the command of the drive");
         assert_eq!(calls_of(&mut state), []);
-        state.told(Event::RunProgress {
+        state.apply_event(Event::RunProgress {
             session: "s1".to_owned(),
             target: 0,
             run: 0,
@@ -312,11 +318,11 @@ mod tests {
             doing: "tracking".to_owned(),
         });
         assert_eq!(calls_of(&mut state).len(), 1, "an event makes it stale");
-        state.took_drive("s1".to_owned(), view(3, true));
+        state.on_drive_reply("s1".to_owned(), view(3, true));
         assert_eq!(state.cursor.step, 2);
-        // Whoever looks at an earlier stop stays there.
+        // A cursor at an earlier stop stays there.
         state.cursor.step = 0;
-        state.took_drive("s1".to_owned(), view(4, true));
+        state.on_drive_reply("s1".to_owned(), view(4, true));
         assert_eq!(state.cursor.step, 0);
     }
 
@@ -324,12 +330,14 @@ mod tests {
     fn pausing_stepping_and_driving_on_are_one_command_to_the_server() {
         let mut state = driving(1);
         let _ = calls_of(&mut state);
-        state.took_drive("s1".to_owned(), view(2, true));
+        state.on_drive_reply("s1".to_owned(), view(2, true));
         let last = state.last_stop().unwrap();
-        for (ask, pause_at) in
-            [(Ask::Pause, json!(last)), (Ask::OneStop, json!(last + 1)), (Ask::GoOn, json!(null))]
-        {
-            state.perform(Command::Drive(ask));
+        for (command, pause_at) in [
+            (DrivingCommand::Pause, json!(last)),
+            (DrivingCommand::OneStop, json!(last + 1)),
+            (DrivingCommand::GoOn, json!(null)),
+        ] {
+            state.perform(Command::Drive(command));
             let (path, body) = calls_of(&mut state).pop().unwrap();
             assert_eq!(path, "sessions/s1/drive");
             assert_eq!(body.unwrap()["pause_at"], pause_at);
@@ -339,17 +347,17 @@ mod tests {
     #[test]
     fn a_drive_begins_at_the_first_stop_and_branches_at_the_one_that_is_looked_at() {
         let mut state = fixture::at_step(&egui::Context::default(), 2);
-        state.perform(Command::Drive(Ask::Begin));
+        state.perform(Command::Drive(DrivingCommand::Begin));
         let (path, body) = calls_of(&mut state).pop().unwrap();
         assert_eq!(path, "sessions/s1/targets/0/runs/0/drive");
         assert_eq!(body.unwrap().get("from_step"), None);
-        state.perform(Command::Drive(Ask::Begin));
+        state.perform(Command::Drive(DrivingCommand::Begin));
         assert_eq!(calls_of(&mut state), [], "one world at a time");
 
         let mut state = driving(2);
         let _ = calls_of(&mut state);
-        state.took_drive("s1".to_owned(), view(3, false));
-        state.perform(Command::Drive(Ask::Begin));
+        state.on_drive_reply("s1".to_owned(), view(3, false));
+        state.perform(Command::Drive(DrivingCommand::Begin));
         assert_eq!(calls_of(&mut state).pop().unwrap().1.unwrap()["from_step"], json!(2));
     }
 }

@@ -1,4 +1,4 @@
-//! A drive to several targets: which are visited afterwards, and how the visits ended.
+//! A drive to several targets: those to visit afterwards, and the outcomes of the visits.
 
 use egui::{Label, RichText, Ui};
 use sightline_rover::driving::{Cycle, StopReason};
@@ -6,12 +6,12 @@ use sightline_session::driving::DriveView;
 use sightline_session::visits::Visit;
 
 use crate::command::Command;
-use crate::driving::Ask;
+use crate::driving::DrivingCommand;
 use crate::panels::numbers::fixed;
 use crate::state::State;
 use crate::theme;
 
-/// The targets that the rover can visit after the present one, each with a check; their order is that of the checks.
+/// Shows a check box for each target that can be visited after the current one; they are visited in the order of checking.
 pub(super) fn form(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let Some(session) = &state.session else { return };
     let driver = state.drive().and_then(|drive| drive.steering.as_ref()).map(|steering| steering.target);
@@ -48,16 +48,16 @@ pub(super) fn form(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
                     estimate alone.";
         let shown = ui.checkbox(&mut command.look_at_waiting, "look at the waiting targets");
         if shown.on_hover_text(help).changed() {
-            out.push(Command::Drive(Ask::Form(command)));
+            out.push(Command::Drive(DrivingCommand::Form(command)));
         }
     }
     if then != state.driving.then {
-        out.push(Command::Drive(Ask::Then(then)));
+        out.push(Command::Drive(DrivingCommand::Then(then)));
     }
 }
 
-/// What the mast looks at after a decision without a motion.
-pub(super) fn look(state: &State, cycle: &Cycle) -> String {
+/// The action of the mast after a decision without a motion.
+pub(super) fn mast_action(state: &State, cycle: &Cycle) -> String {
     let targets = state.session.iter().flat_map(|session| &session.targets);
     let is_it = |designation| targets.into_iter().find(|target| target.designation == designation);
     match cycle.looks_at.map(is_it) {
@@ -67,7 +67,7 @@ pub(super) fn look(state: &State, cycle: &Cycle) -> String {
     }
 }
 
-/// One line a visit that has ended, and the targets that are left.
+/// Shows one line per completed visit, and the remaining targets.
 pub(super) fn list(ui: &mut Ui, state: &State, drive: &DriveView) {
     let label = |number: usize| {
         let targets = state.session.iter().flat_map(|session| &session.targets);
@@ -90,7 +90,7 @@ pub(super) fn list(ui: &mut Ui, state: &State, drive: &DriveView) {
     }
 }
 
-/// How a visit ended.
+/// The outcome of a visit.
 fn sentence(label: &str, visit: &Visit) -> String {
     let reason = match visit.reason {
         StopReason::Arrived => "arrived".to_owned(),

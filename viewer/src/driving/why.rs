@@ -1,16 +1,16 @@
-//! Why the drive stopped: a card with the cause and its evidence, and the changes with which it would have gone on.
+//! Why the drive stopped: a card with the cause and its evidence, and the changes with which it would have continued.
 
 use egui::{Frame, Label, Margin, RichText, Stroke, Ui};
 use sightline_session::stop_cause::{DecisionChange, StopExplanation};
 
 use crate::command::{Command, Go};
-use crate::driving::{Ask, tried};
+use crate::driving::{DrivingCommand, trial_drives};
 use crate::layout::command::LayoutCommand;
 use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::theme;
 
-/// Shows the cause in one sentence, with a button that leads to its evidence.
+/// Shows the cause in one sentence, with a button to its evidence.
 pub(crate) fn headline(ui: &mut Ui, why: &StopExplanation, out: &mut Vec<Command>) {
     card(ui, |ui| {
         sentence(ui, why);
@@ -39,21 +39,21 @@ pub(crate) fn show_here(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     });
 }
 
-/// A change with its decision, the button that puts it into the form, and the whole drive with it.
+/// Shows a change with its decision, the button that puts it into the form, and the trial drive with it.
 fn changed(ui: &mut Ui, state: &State, change: &DecisionChange, out: &mut Vec<Command>) {
     ui.horizontal_wrapped(|ui| {
         if let Some(command) = &change.command {
             let help = "Puts this command into the form of the panel Drive; a branch at an earlier stop drives under it";
             let name = format!("use {}", change.text);
             if ui.small_button("Use").accessible_name(name).on_hover_text(help).clicked() {
-                out.push(Command::Drive(Ask::Form(command.clone())));
+                out.push(Command::Drive(DrivingCommand::Form(command.clone())));
                 out.push(Command::Layout(LayoutCommand::Show(Pane::Drive)));
             }
         }
         let words = format!("{}: {}", change.text, change.decision);
         ui.add(Label::new(RichText::new(words).size(12.0).color(theme::text())).wrap());
     });
-    ui.horizontal_wrapped(|ui| tried::show(ui, state, change, out));
+    ui.horizontal_wrapped(|ui| trial_drives::show(ui, state, change, out));
 }
 
 fn sentence(ui: &mut Ui, why: &StopExplanation) {

@@ -1,4 +1,4 @@
-//! Motions, ends and outcomes in words.
+//! Words for motions, endings and outcomes.
 
 use sightline_rover::driving::{Cycle, Ending, NavigatorKind, OdometryPair, StopReason, TrackedStops, Veto};
 use sightline_rover::hazards::HazardTerm;
@@ -9,7 +9,7 @@ pub(super) use sightline_session::stop_cause::words::motion;
 use crate::panels::digits;
 use crate::panels::numbers::{counted, fixed};
 
-/// What chooses the motions.
+/// The navigator.
 pub(super) fn navigator(navigator: NavigatorKind) -> &'static str {
     match navigator {
         NavigatorKind::Arcs => "no hazard avoidance",
@@ -18,7 +18,7 @@ pub(super) fn navigator(navigator: NavigatorKind) -> &'static str {
     }
 }
 
-/// A term of the ground with its value.
+/// A hazard term with its value.
 pub(super) fn term(term: HazardTerm, value: f64) -> String {
     match term {
         HazardTerm::Tilt => format!("tilt {}°", fixed(value, 1)),
@@ -28,7 +28,7 @@ pub(super) fn term(term: HazardTerm, value: f64) -> String {
     }
 }
 
-/// Why a path must not be driven.
+/// The reason for the veto of a path.
 pub(super) fn veto(veto: &Veto) -> String {
     let (name, scale, unit) = match veto.term {
         HazardTerm::Tilt => ("tilt", 1.0, "°"),
@@ -43,7 +43,7 @@ pub(super) fn veto(veto: &Veto) -> String {
     format!("{name} {value}{unit} at {} m, limit {limit}{unit}", fixed(veto.along_m, 2))
 }
 
-/// What visual odometry is used for.
+/// The use of visual odometry.
 pub(super) fn odometry(mode: OdometryMode) -> &'static str {
     match mode {
         OdometryMode::Off => "no visual odometry",
@@ -52,7 +52,7 @@ pub(super) fn odometry(mode: OdometryMode) -> &'static str {
     }
 }
 
-/// The stops at which the target is looked for.
+/// The stops at which the target is tracked.
 pub(super) fn tracked_stops(stops: TrackedStops) -> &'static str {
     match stops {
         TrackedStops::Every => "track at every stop",
@@ -60,7 +60,7 @@ pub(super) fn tracked_stops(stops: TrackedStops) -> &'static str {
     }
 }
 
-/// The pairs of visual odometry.
+/// The stereo pairs of visual odometry.
 pub(super) fn odometry_pair(pair: OdometryPair) -> &'static str {
     match pair {
         OdometryPair::Shared => "odometry in the tracker's pairs",
@@ -68,7 +68,7 @@ pub(super) fn odometry_pair(pair: OdometryPair) -> &'static str {
     }
 }
 
-/// The settings of visual odometry.
+/// The preset of visual odometry.
 pub(super) fn preset(preset: OdometryPreset) -> &'static str {
     match preset {
         OdometryPreset::Sightline => "odometry as sightline",
@@ -76,7 +76,7 @@ pub(super) fn preset(preset: OdometryPreset) -> &'static str {
     }
 }
 
-/// The slip of the step to a stop by vision, or that it was refused.
+/// The slip of the step to a stop as measured by visual odometry, or that the measurement was refused.
 pub(super) fn slip(measured: &MeasuredMotion) -> String {
     match (measured.update.accepted, measured.update.slip) {
         (false, _) => "no update".to_owned(),
@@ -85,7 +85,7 @@ pub(super) fn slip(measured: &MeasuredMotion) -> String {
     }
 }
 
-/// The end with the numbers that decided.
+/// The ending, with the value and the limit that decided.
 pub(super) fn ending(ending: &Ending) -> String {
     if let (StopReason::Arrived, Some(value), Some(limit)) = (ending.reason, ending.value, ending.limit) {
         let [value, limit] = [value, limit].map(|metres| fixed(100.0 * metres, 1));
@@ -117,7 +117,7 @@ pub(super) fn ending(ending: &Ending) -> String {
     }
 }
 
-/// The outcome of a drive; against the truth where it is known.
+/// The outcome of a drive, with its errors if the ground truth is known.
 pub(super) fn summary(summary: &DriveSummary) -> String {
     let mut words = format!(
         "{}, {} m driven in {} min on Mars",
@@ -136,7 +136,7 @@ pub(super) fn summary(summary: &DriveSummary) -> String {
     words
 }
 
-/// What the rover reported of the drive from a stop.
+/// The rover's report of the drive from a stop.
 pub(super) fn report(cycle: &Cycle) -> String {
     match cycle.report {
         None => String::new(),
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn ends_are_told_in_words() {
+    fn endings_have_words_and_values() {
         let named = |reason, value, detail| Ending { reason, value, limit: value, detail };
         let arrived = Ending { limit: Some(0.01), ..named(StopReason::Arrived, Some(0.008), None) };
         assert_eq!(ending(&arrived), "arrived: 0.8 cm from the goal by its own estimate, tolerance 1.0 cm");

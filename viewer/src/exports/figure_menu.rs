@@ -1,24 +1,24 @@
-//! Saving a panel as a figure, from its menu: as vectors, or as pixels at a scale; with a line that says of what.
+//! The menu entries that save a panel as a figure: as vectors, or as pixels at a scale, with an optional caption.
 
 use egui::{Button, Ui, vec2};
 
 use crate::command::Command;
-use crate::exports::Ask;
-use crate::figure::wish::{Kind, Sheet, Wish};
+use crate::exports::ExportsCommand;
+use crate::figure::request::{FigureFormat, FigurePage, FigureRequest};
 use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::theme;
 
-/// The entries for one panel.
+/// Shows the entries of one panel.
 pub(crate) fn entries(ui: &mut Ui, state: &State, pane: Pane, out: &mut Vec<Command>) {
     ui.label(theme::title("Save as a figure"));
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 3.0;
-        for kind in Kind::ALL {
+        for kind in FigureFormat::ALL {
             let button = ui.add(Button::new(kind.word()).min_size(vec2(24.0, 24.0)));
             let button = button.accessible_name(format!("save {} as {}", pane.title(), kind.word()));
             if button.clicked() {
-                out.push(Command::Exports(Ask::Figure(Wish { pane, kind })));
+                out.push(Command::Exports(ExportsCommand::Figure(FigureRequest { pane, kind })));
                 ui.close();
             }
         }
@@ -27,21 +27,21 @@ pub(crate) fn entries(ui: &mut Ui, state: &State, pane: Pane, out: &mut Vec<Comm
     burn_in(ui, state, out);
 }
 
-/// Ground and width of figures.
+/// Shows the choices of background and width.
 pub(crate) fn sheets(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
-    for sheet in Sheet::ALL {
+    for sheet in FigurePage::ALL {
         let button = Button::selectable(state.exports.sheet == sheet, sheet.words());
         if ui.add(button.min_size(vec2(24.0, 24.0))).clicked() {
-            out.push(Command::Exports(Ask::Sheet(sheet)));
+            out.push(Command::Exports(ExportsCommand::Sheet(sheet)));
         }
     }
 }
 
-/// Whether a line above the figure says what it is of.
+/// Shows the choice of a caption above the figure.
 pub(crate) fn burn_in(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let mut is_on = state.exports.burns_in;
     let words = "with a line above: panel, drive, run, step";
     if ui.checkbox(&mut is_on, words).changed() {
-        out.push(Command::Exports(Ask::BurnIn(is_on)));
+        out.push(Command::Exports(ExportsCommand::BurnIn(is_on)));
     }
 }

@@ -1,4 +1,4 @@
-//! Exports: what the session can be had as, and what a person asked for.
+//! Exports: the files of the session, and the options of figures.
 
 pub(crate) mod window;
 pub(crate) mod as_text;
@@ -7,61 +7,61 @@ pub(crate) mod update;
 
 use sightline_session::exports::ExportEntry;
 
-use crate::figure::wish::{Kind, Sheet, Wish};
+use crate::figure::request::{FigureFormat, FigurePage, FigureRequest};
 use crate::panels::pane::Pane;
 
-/// What a person asks of exports.
+/// A command about exports.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Ask {
+pub enum ExportsCommand {
     /// Opens the window.
     Open,
-    /// Closes it.
+    /// Closes the window.
     Close,
-    /// Looks at another part of the session.
-    Of(Part),
+    /// Selects the part of the session to export.
+    Scope(ExportScope),
     /// Downloads a file by its path below `/api/v1/`.
     Download(String),
     /// Saves a panel as a figure.
-    Figure(Wish),
-    /// Chooses what the figures of the window are saved as.
-    Kind(Kind),
-    /// Chooses ground and width of figures.
-    Sheet(Sheet),
-    /// Puts a line above figures that says of what they are, or does not.
+    Figure(FigureRequest),
+    /// Chooses the file format of the window's figures.
+    Format(FigureFormat),
+    /// Chooses background and width of figures.
+    Sheet(FigurePage),
+    /// Whether figures have a caption above them.
     BurnIn(bool),
     /// Opens the plain page of the step.
     PlainPage,
 }
 
-/// Which part of the session is exported.
+/// The part of the session to export.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Part {
-    /// All of it.
+pub enum ExportScope {
+    /// The whole session.
     #[default]
     Session,
-    /// The target that is looked at.
+    /// The selected target.
     Target,
-    /// The run that is looked at.
+    /// The selected run.
     Run,
 }
 
-/// What is known of exports.
+/// The state of the window of exports.
 #[derive(Clone, Debug, Default)]
 pub struct Exports {
     /// Whether the window is open.
     pub is_open: bool,
-    /// What it shows.
-    pub part: Part,
-    /// The files; none before the server has said.
+    /// The part to export.
+    pub scope: ExportScope,
+    /// The files; `None` until received.
     pub entries: Option<Vec<ExportEntry>>,
-    /// Why there are none.
+    /// The server's explanation, if it refused the list.
     pub refused: Option<String>,
     /// The panels on the screen.
     pub panes: Vec<Pane>,
-    /// What the figures of the window are saved as.
-    pub kind: Kind,
-    /// Ground and width of figures.
-    pub sheet: Sheet,
-    /// Whether a line above a figure says of what it is.
+    /// The file format of the window's figures.
+    pub format: FigureFormat,
+    /// Background and width of figures.
+    pub sheet: FigurePage,
+    /// Whether figures have a caption above them.
     pub burns_in: bool,
 }

@@ -1,4 +1,4 @@
-//! Carries out what a person asks of exports.
+//! Carries out the user's commands about exports.
 
 use sightline_api::endpoint::Call;
 use sightline_api::endpoints::{
@@ -7,7 +7,7 @@ use sightline_api::endpoints::{
 use sightline_api::location::{Anywhere, AtSession};
 use sightline_api::query::SessionPart;
 
-use crate::exports::{Ask, Part};
+use crate::exports::{ExportScope, ExportsCommand};
 use crate::state::State;
 use crate::state::effect::Effect;
 
@@ -22,28 +22,28 @@ pub(crate) fn stream_to_rerun(session: String) -> Call {
 }
 
 impl State {
-    /// Carries out what was asked of exports.
-    pub(crate) fn ask_of_exports(&mut self, ask: Ask) {
-        match ask {
-            Ask::Open => {
+    /// Carries out a command about exports.
+    pub(crate) fn apply_exports_command(&mut self, command: ExportsCommand) {
+        match command {
+            ExportsCommand::Open => {
                 self.exports.is_open = true;
-                self.want_exports();
+                self.read_exports();
             }
-            Ask::Close => self.exports.is_open = false,
-            Ask::Of(part) => {
-                self.exports.part = part;
-                self.want_exports();
+            ExportsCommand::Close => self.exports.is_open = false,
+            ExportsCommand::Scope(scope) => {
+                self.exports.scope = scope;
+                self.read_exports();
             }
-            Ask::Download(path) => self.open_path(&path),
-            Ask::Figure(wish) => self.outbox.add(Effect::SaveFigure(wish)),
-            Ask::Kind(kind) => self.exports.kind = kind,
-            Ask::Sheet(sheet) => self.exports.sheet = sheet,
-            Ask::BurnIn(is_on) => self.exports.burns_in = is_on,
-            Ask::PlainPage => self.open_path(&self.plain_page()),
+            ExportsCommand::Download(path) => self.open_path(&path),
+            ExportsCommand::Figure(request) => self.outbox.add(Effect::SaveFigure(request)),
+            ExportsCommand::Format(format) => self.exports.format = format,
+            ExportsCommand::Sheet(sheet) => self.exports.sheet = sheet,
+            ExportsCommand::BurnIn(is_on) => self.exports.burns_in = is_on,
+            ExportsCommand::PlainPage => self.open_path(&self.plain_page()),
         }
     }
 
-    /// Where the plain page of what is looked at is, below `/api/v1/`.
+    /// Path of the plain page of the current view, below `/api/v1/`.
     pub(crate) fn plain_page(&self) -> String {
         match (&self.session, self.step_key(self.cursor.step).filter(|_| self.row().is_some())) {
             (_, Some(key)) => Call::to::<ShowStepPage>(&key).path,
@@ -54,12 +54,12 @@ impl State {
         }
     }
 
-    fn want_exports(&mut self) {
+    fn read_exports(&mut self) {
         (self.exports.entries, self.exports.refused) = (None, None);
-        let (target, run) = match self.exports.part {
-            Part::Session => (None, None),
-            Part::Target => (self.cursor.target, None),
-            Part::Run => (self.cursor.target, self.cursor.target.map(|_| self.cursor.run)),
+        let (target, run) = match self.exports.scope {
+            ExportScope::Session => (None, None),
+            ExportScope::Target => (self.cursor.target, None),
+            ExportScope::Run => (self.cursor.target, self.cursor.target.map(|_| self.cursor.run)),
         };
         let Some(session) = self.session_id() else { return };
         let call = Call::with_query::<ListExports>(&AtSession { session }, &SessionPart { target, run });

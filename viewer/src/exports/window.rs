@@ -6,8 +6,8 @@ use sightline_session::exports::ExportEntry;
 use crate::command::Command;
 use crate::exports::as_text;
 use crate::exports::figure_menu;
-use crate::exports::{Ask, Part};
-use crate::figure::wish::{Kind, Wish};
+use crate::exports::{ExportScope, ExportsCommand};
+use crate::figure::request::{FigureFormat, FigureRequest};
 use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::theme;
@@ -22,7 +22,8 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         let height = (ui.ctx().content_rect().height() - 150.0).max(200.0);
         ui.label(RichText::new("Export").size(16.0).strong().color(theme::strong()));
         parts(ui, state, out);
-        // The window has its full height from the first frame: it must not move under the pointer when files are listed.
+        // The list has its full height from the first frame, so that it does not move under the pointer when files are
+        // listed.
         let list = ScrollArea::vertical().max_height(height).min_scrolled_height(height).auto_shrink(false);
         list.show(ui, |ui| {
             files(ui, state, out);
@@ -34,7 +35,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         ui.separator();
         ui.horizontal(|ui| {
             let is_closed = ui.button("Close").clicked();
-            // The bar with the newest message is behind the window.
+            // The status bar with the newest message is behind the window.
             if let Some(message) = state.newest_message() {
                 ui.add(egui::Label::new(theme::note(&message.text)).truncate());
             }
@@ -43,7 +44,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         .inner
     });
     if modal.inner || modal.should_close() {
-        out.push(Command::Exports(Ask::Close));
+        out.push(Command::Exports(ExportsCommand::Close));
     }
 }
 
@@ -52,14 +53,14 @@ fn parts(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         ui.label(theme::label("of"));
         let has_target = state.target().is_some();
         for (part, words, is_on) in [
-            (Part::Session, "the whole session", true),
-            (Part::Target, "this target", has_target),
-            (Part::Run, "this run", has_target),
+            (ExportScope::Session, "the whole session", true),
+            (ExportScope::Target, "this target", has_target),
+            (ExportScope::Run, "this run", has_target),
         ] {
             let button =
-                egui::Button::selectable(state.exports.part == part, words).min_size(egui::vec2(24.0, 24.0));
+                egui::Button::selectable(state.exports.scope == part, words).min_size(egui::vec2(24.0, 24.0));
             if ui.add_enabled(is_on, button).clicked() {
-                out.push(Command::Exports(Ask::Of(part)));
+                out.push(Command::Exports(ExportsCommand::Scope(part)));
             }
         }
     });
@@ -92,7 +93,7 @@ fn file(ui: &mut Ui, state: &State, entry: &ExportEntry, out: &mut Vec<Command>)
     ui.horizontal(|ui| {
         let named = |words: &str| format!("{words}: {}", entry.title);
         if ui.button("Download").accessible_name(named("download")).clicked() {
-            out.push(Command::Exports(Ask::Download(entry.path.clone())));
+            out.push(Command::Exports(ExportsCommand::Download(entry.path.clone())));
         }
         copy(ui, "Copy as command", &named("copy as command"), Some(entry.command.clone()));
         let http = as_text::download(&state.origin, entry);
@@ -100,7 +101,7 @@ fn file(ui: &mut Ui, state: &State, entry: &ExportEntry, out: &mut Vec<Command>)
     });
 }
 
-/// A button that copies a text, which is shown when the pointer rests on it; disabled where there is none.
+/// Shows a button that copies a text and shows it as a tooltip; disabled without a text.
 fn copy(ui: &mut Ui, words: &str, name: &str, text: Option<String>) {
     let button = ui.add_enabled(text.is_some(), egui::Button::new(words)).accessible_name(name);
     if let Some(text) = text {
@@ -117,10 +118,10 @@ fn pictures(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ui.label(theme::title("A panel as a figure"));
     ui.horizontal_wrapped(|ui| {
         ui.label(theme::label("as"));
-        for kind in Kind::ALL {
-            let button = egui::Button::selectable(state.exports.kind == kind, kind.word());
+        for kind in FigureFormat::ALL {
+            let button = egui::Button::selectable(state.exports.format == kind, kind.word());
             if ui.add(button.min_size(egui::vec2(24.0, 24.0))).clicked() {
-                out.push(Command::Exports(Ask::Kind(kind)));
+                out.push(Command::Exports(ExportsCommand::Format(kind)));
             }
         }
         figure_menu::burn_in(ui, state, out);
@@ -133,15 +134,15 @@ fn pictures(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             for pane in Pane::ALL.into_iter().filter(|pane| seen(pane) == is_seen) {
                 let button = ui.button(pane.title()).accessible_name(format!("figure of {}", pane.title()));
                 if button.clicked() {
-                    let kind = state.exports.kind;
-                    out.push(Command::Exports(Ask::Figure(Wish { pane, kind })));
+                    let kind = state.exports.format;
+                    out.push(Command::Exports(ExportsCommand::Figure(FigureRequest { pane, kind })));
                 }
             }
         });
     }
     ui.add_space(4.0);
     if ui.button("Open this step as a plain page").clicked() {
-        out.push(Command::Exports(Ask::PlainPage));
+        out.push(Command::Exports(ExportsCommand::PlainPage));
     }
     ui.label(theme::note(
         "Without WebGL and JavaScript, with described pictures and tables; it can be saved and printed.",

@@ -1,6 +1,6 @@
-//! A figure as an opaque PNG, drawn anew at the scale that is asked for: lines and letters are sharp at every scale.
+//! A figure as an opaque PNG, rendered at the requested scale, so that lines and letters are sharp at every scale.
 //!
-//! It is drawn by the processor, so that the limits of the graphics card's textures do not count; the limit is memory.
+//! It is rendered by the CPU, so that the limits of the graphics card's textures do not apply; the limit is memory.
 
 use egui::{Color32, ColorImage, FontDefinitions, FontFamily, Rect};
 use tiny_skia::{
@@ -11,26 +11,26 @@ use tiny_skia::{
 use crate::figure::faces::Faces;
 use crate::figure::{Figure, Form, Ink, Words};
 
-/// The most pixels of a picture: four bytes each while it is drawn.
+/// Maximum number of pixels, each of which takes four bytes while it is rendered.
 pub(crate) const PIXELS_MAX: f64 = 48e6;
 
-/// Where the chunk `IHDR` of a PNG file ends: after 8 bytes of signature and 25 of the chunk.
+/// The end of the chunk `IHDR` of a PNG file: 8 bytes of signature and 25 of the chunk.
 const HEADER_END: usize = 33;
 
-/// How far a circle's handles reach: of a quarter that is drawn as one Bézier curve.
+/// Length of the handles of a quarter circle drawn as one cubic Bézier curve, in radii.
 const QUARTER: f32 = 0.552_284_8;
 
-/// By how much the stems of the proportional font are thickened, sizes of the letters. The page has a light font, which
-/// it paints heavier than its outlines; SVG files ask for the regular weight.
+/// Thickening of the stems of the proportional font, in font sizes. The page has a light font, which it paints heavier
+/// than its outlines; SVG files request the regular weight.
 const EMBOLDENING: f32 = 0.018;
 
-/// How far italics lean: the tangent.
+/// Slant of italics: the tangent of the angle.
 const LEAN: f32 = 0.2;
 
 /// Width and height at a scale, px.
 ///
 /// # Errors
-/// A sentence when there would be too many pixels.
+/// A sentence if there would be too many pixels.
 pub(crate) fn size_px(figure: &Figure, scale: u8) -> Result<[u32; 2], String> {
     let side = |points: f32| (f64::from(points) * f64::from(scale)).round().max(1.0);
     let [width, height] = [side(figure.size.x), side(figure.size.y)];
@@ -48,10 +48,10 @@ pub(crate) fn size_px(figure: &Figure, scale: u8) -> Result<[u32; 2], String> {
     Ok([width as u32, height as u32])
 }
 
-/// The picture at a scale, as a PNG file.
+/// Renders the figure at a scale as a PNG file.
 ///
 /// # Errors
-/// A sentence when it would be too large.
+/// A sentence if it would be too large.
 pub(crate) fn png(figure: &Figure, scale: u8, fonts: &FontDefinitions) -> Result<Vec<u8>, String> {
     let pixmap = drawn(figure, scale, fonts)?;
     let pixels: Vec<u8> =
@@ -78,10 +78,10 @@ fn crc32(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(u32::MAX, |crc, byte| (0..8).fold(crc ^ u32::from(*byte), |crc, _| bits(crc)))
 }
 
-/// Pixels with their opacity as a PNG file.
+/// Encodes pixels with their opacity as a PNG file.
 ///
 /// # Errors
-/// A sentence when they cannot be encoded.
+/// A sentence if they cannot be encoded.
 pub(crate) fn png_of(pixels: &ColorImage) -> Result<Vec<u8>, String> {
     let [width, height] = pixels.size.map(|side| side as u32);
     let is_opaque = pixels.pixels.iter().all(|colour| colour.a() == u8::MAX);
@@ -108,7 +108,7 @@ fn drawn(figure: &Figure, scale: u8, fonts: &FontDefinitions) -> Result<Pixmap, 
     let [width, height] = size_px(figure, scale)?;
     let mut pixmap =
         Pixmap::new(width, height).ok_or_else(|| "The panel has no size on the screen.".to_owned())?;
-    // What is behind the page is nobody's business: the picture is opaque.
+    // The PNG is opaque, independent of what is behind the page.
     pixmap.fill(colour(figure.ground.to_opaque()));
     let mut sheet = Sheet { pixmap, scale: f32::from(scale), mask: None, faces: Faces::new(fonts) };
     for piece in &figure.pieces {
@@ -120,7 +120,7 @@ fn drawn(figure: &Figure, scale: u8, fonts: &FontDefinitions) -> Result<Pixmap, 
 struct Sheet<'a> {
     pixmap: Pixmap,
     scale: f32,
-    /// The mask of the last clip that cut something.
+    /// The mask of the last clip rectangle that was needed.
     mask: Option<(Rect, Mask)>,
     faces: Faces<'a>,
 }
@@ -174,7 +174,7 @@ fn letters(pixmap: &mut Pixmap, faces: &mut Faces<'_>, words: &Words, whole: Tra
     }
 }
 
-/// Draws a picture into a rectangle: magnified with whole pixels, made small by averaging.
+/// Draws an image into a rectangle: whole pixels when magnified, averaged when reduced.
 fn picture(pixmap: &mut Pixmap, pixels: &ColorImage, place: Rect, scale: f32, mask: Option<&Mask>) {
     let wanted = [place.width(), place.height()].map(|side| (side * scale).round().max(1.0) as usize);
     let averaged;
@@ -197,7 +197,7 @@ fn picture(pixmap: &mut Pixmap, pixels: &ColorImage, place: Rect, scale: f32, ma
     }
 }
 
-/// A smaller picture, each of whose pixels is the mean of those that it covers.
+/// A reduced image, each pixel of which is the mean of those that it covers.
 fn average(pixels: &ColorImage, [width, height]: [usize; 2]) -> ColorImage {
     let range = |k: usize, count: usize, side: usize| {
         let first = k * side / count;
@@ -224,7 +224,7 @@ fn texture(pixels: &ColorImage) -> Option<Pixmap> {
     let mut texture = Pixmap::new(pixels.size[0] as u32, pixels.size[1] as u32)?;
     for (place, colour) in texture.pixels_mut().iter_mut().zip(&pixels.pixels) {
         let [r, g, b, a] = colour.to_array();
-        // Colours that add light have no place in a picture.
+        // Additive colours, with components above alpha, cannot be represented; clamp them.
         *place = PremultipliedColorU8::from_rgba(r.min(a), g.min(a), b.min(a), a)?;
     }
     Some(texture)
@@ -243,7 +243,7 @@ fn mask(clip: Rect, scale: f32, [width, height]: [u32; 2]) -> Option<Mask> {
     Some(mask)
 }
 
-/// The path of a form, and how it is turned.
+/// The path of a form, and its rotation.
 fn path(form: &Form) -> Option<(Path, Transform)> {
     let mut path = PathBuilder::new();
     let mut turn = Transform::identity();
@@ -278,7 +278,7 @@ fn path(form: &Form) -> Option<(Path, Transform)> {
     Some((path.finish()?, turn))
 }
 
-/// A rectangle with round corners, clockwise.
+/// A rectangle with rounded corners, clockwise.
 fn corners(path: &mut PathBuilder, Rect { min, max }: Rect, [nw, ne, se, sw]: [f32; 4]) {
     let away = 1.0 - QUARTER;
     path.move_to(min.x + nw, min.y);

@@ -1,4 +1,4 @@
-//! The outlines of letters, from the fonts with which the page paints.
+//! The outlines of letters, from the fonts of the page.
 
 use std::collections::HashMap;
 
@@ -6,7 +6,7 @@ use ab_glyph::{Font, FontRef, OutlineCurve};
 use egui::{FontDefinitions, FontFamily};
 use tiny_skia::{Path, PathBuilder};
 
-/// The fonts of every family, in the order in which a letter is looked for.
+/// The fonts of every family, in the order in which they are searched for a letter.
 pub(crate) struct Faces<'a> {
     families: HashMap<FontFamily, Vec<Face<'a>>>,
     outlines: HashMap<(FontFamily, char), Option<Path>>,
@@ -19,7 +19,7 @@ struct Face<'a> {
 }
 
 impl<'a> Faces<'a> {
-    /// The fonts of these definitions; one that cannot be read is left out.
+    /// Loads the fonts of these definitions; unreadable ones are omitted.
     pub(crate) fn new(definitions: &'a FontDefinitions) -> Self {
         let face = |name: &String| {
             let data = definitions.font_data.get(name)?;
@@ -34,14 +34,14 @@ impl<'a> Faces<'a> {
         Self { families, outlines: HashMap::new() }
     }
 
-    /// The outline of a letter one point large, y down from the baseline; none for a blank.
+    /// The outline of a letter at a size of one point, y down from the baseline; `None` for a blank.
     pub(crate) fn outline(&mut self, family: &FontFamily, letter: char) -> Option<&Path> {
         let key = (family.clone(), letter);
         let families = &self.families;
         self.outlines.entry(key).or_insert_with(|| outline(families.get(family)?, letter)).as_ref()
     }
 
-    /// The advance width of a letter one point large, points.
+    /// The advance width of a letter at a size of one point, points.
     pub(crate) fn advance(&self, family: &FontFamily, letter: char) -> f32 {
         let advance = || {
             let font = &face_of(self.families.get(family)?, letter)?.font;
@@ -51,7 +51,7 @@ impl<'a> Faces<'a> {
     }
 }
 
-/// The first font that has the letter, else the first one.
+/// The first font that contains the letter, else the first one.
 fn face_of<'a, 'f>(faces: &'a [Face<'f>], letter: char) -> Option<&'a Face<'f>> {
     faces.iter().find(|face| face.font.glyph_id(letter).0 != 0).or(faces.first())
 }

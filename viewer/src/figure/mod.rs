@@ -1,27 +1,27 @@
-//! A panel as a figure: what egui painted inside the panel's rectangle, as shapes that do not depend on the screen.
+//! A panel as a figure: the shapes that egui painted inside the panel's rectangle, independent of the screen.
 //!
 //! ```text
-//! painted shapes ─► shapes ─► Figure ─┬─► svg      vector, words stay words
-//!                     words ──┘       └─► bitmap   PNG at 1× to 4×, drawn anew at that scale
+//! painted shapes ─► shapes ─► Figure ─┬─► svg      vector, text stays text
+//!                     words ──┘       └─► bitmap   PNG, rendered at 1× to 4×
 //! ```
 //! | file | what it does |
 //! |---|---|
-//! | `shapes` | egui's shapes as inks |
-//! | `words` | egui's laid out text as words with size, colour and the place of every letter |
+//! | `shapes` | converts egui's shapes to inks |
+//! | `words` | egui's text layouts as text with size, colour and the position of every letter |
 //! | `svg` | a figure as a self-contained SVG file |
 //! | `bitmap` | a figure as an opaque PNG file |
 //! | `faces` | the outlines of the letters |
-//! | `wish` | what is wanted of a figure |
-//! | `save` | the figure of a panel: on the screen or not, with a title or without; its file name |
+//! | `request` | the request for a figure: panel and file type |
+//! | `save` | the figure of a panel, visible or not, with or without a caption, and its file name |
 //!
-//! The figure is made of the layer in which panels are painted: menus and tips that lie above it are no part of it.
+//! The figure contains the layer in which panels are painted; menus and tooltips above it are not part of it.
 
 pub(crate) mod bitmap;
 mod faces;
 pub(crate) mod shapes;
 pub(crate) mod save;
 pub(crate) mod svg;
-pub(crate) mod wish;
+pub(crate) mod request;
 pub(crate) mod words;
 
 use std::cell::Cell;
@@ -30,105 +30,105 @@ use std::sync::Arc;
 use egui::{Color32, ColorImage, FontFamily, Pos2, Rect, Stroke, Vec2};
 
 thread_local! {
-    /// Whether a figure for a paper is being drawn; the page paints on one thread.
+    /// Whether a figure for a paper is being rendered; the page paints on one thread.
     static ON_PAPER: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Whether a figure for a paper is being drawn: controls are left out then.
+/// Whether a figure for a paper is being rendered, which omits controls.
 pub(crate) fn is_on_paper() -> bool {
     ON_PAPER.get()
 }
 
-/// What is painted of a panel, in points from the figure's upper left corner.
+/// The contents of a panel, in points from the figure's upper left corner.
 #[derive(Clone, Debug)]
 pub(crate) struct Figure {
     /// Width and height, points.
     pub size: Vec2,
-    /// What it is called.
+    /// The title of the file.
     pub title: String,
-    /// What it shows, in words.
+    /// The contents in words.
     pub description: String,
-    /// What lies behind everything.
+    /// The background colour.
     pub ground: Color32,
-    /// What is painted, the lowest first.
+    /// The painted shapes, from bottom to top.
     pub pieces: Vec<Piece>,
-    /// How many shapes could not be taken over: what only a graphics card paints, and textures that nobody knows.
+    /// Number of shapes that could not be converted: GPU callbacks, and textures without known pixels.
     pub left_out: usize,
 }
 
-/// One shape with the rectangle to which it is cut.
+/// One shape with its clip rectangle.
 #[derive(Clone, Debug)]
 pub(crate) struct Piece {
-    /// Where it may be seen.
+    /// The clip rectangle.
     pub clip: Rect,
-    /// What it is.
+    /// The shape.
     pub ink: Ink,
 }
 
 /// A shape.
 #[derive(Clone, Debug)]
 pub(crate) enum Ink {
-    /// An outline, filled or drawn.
+    /// An outline, filled or stroked.
     Area {
-        /// Its form.
+        /// Its outline.
         form: Form,
-        /// What fills it; transparent: nothing.
+        /// The fill colour; transparent: no fill.
         fill: Color32,
-        /// What draws it.
+        /// The stroke.
         stroke: Stroke,
     },
-    /// Words on one line.
+    /// Text on one line.
     Words(Words),
-    /// A picture in a rectangle.
+    /// An image in a rectangle.
     Picture {
         /// Its pixels.
         pixels: Arc<ColorImage>,
-        /// Where they lie.
+        /// The rectangle, points.
         place: Rect,
     },
 }
 
-/// The form of an outline.
+/// An outline.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Form {
-    /// A rectangle with the radii of its corners: upper left, upper right, lower right, lower left.
+    /// A rectangle with its corner radii: upper left, upper right, lower right, lower left.
     Rect(Rect, [f32; 4]),
-    /// An ellipse: its middle, its half axes, and by how much it is turned clockwise, rad.
+    /// An ellipse: centre, half axes, and clockwise rotation, rad.
     Ellipse(Pos2, Vec2, f32),
-    /// Straight lines through points, perhaps back to the first.
+    /// Straight lines through points; closed if the flag is set.
     Lines(Vec<Pos2>, bool),
-    /// A cubic Bézier curve, perhaps closed by a straight line.
+    /// A cubic Bézier curve; closed by a straight line if the flag is set.
     Curve([Pos2; 4], bool),
 }
 
-/// Words on one line in one look.
+/// Text on one line in one format.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Words {
-    /// What they say.
+    /// The text.
     pub text: String,
-    /// Where the baseline begins, points.
+    /// The start of the baseline, points.
     pub at: Pos2,
-    /// By how much they are turned clockwise about their beginning, rad.
+    /// Clockwise rotation about the start, rad.
     pub angle: f32,
-    /// From the beginning to where each letter begins, points; `None` for a letter that egui painted as part of a
-    /// ligature: it follows the letter before it.
+    /// Offset of each letter from the start, points; `None` for a letter that egui painted as part of a ligature: it
+    /// follows the letter before it.
     pub places: Vec<Option<f32>>,
-    /// From the beginning to the end of the last letter, points.
+    /// Distance from the start to the end of the last letter, points.
     pub width: f32,
-    /// Size of the letters, points.
+    /// Font size, points.
     pub size: f32,
-    /// Their family.
+    /// Font family.
     pub family: FontFamily,
-    /// Whether they lean.
+    /// Whether it is italic.
     pub is_italic: bool,
-    /// Whether there is more room between the letters than their own.
+    /// Whether it has extra letter spacing.
     pub is_spaced: bool,
-    /// Their colour.
+    /// The colour.
     pub colour: Color32,
 }
 
 impl Form {
-    /// The same, moved.
+    /// The same outline, translated.
     fn moved(self, by: Vec2) -> Self {
         match self {
             Self::Rect(rect, radii) => Self::Rect(rect.translate(by), radii),
@@ -140,7 +140,7 @@ impl Form {
         }
     }
 
-    /// A box around it.
+    /// A bounding box.
     fn bounds(&self) -> Rect {
         match self {
             Self::Rect(rect, _) => *rect,
@@ -162,7 +162,7 @@ impl Ink {
         }
     }
 
-    /// A box around it.
+    /// A bounding box.
     pub(crate) fn bounds(&self) -> Rect {
         match self {
             Self::Area { form, stroke, .. } => form.bounds().expand(stroke.width),

@@ -1,79 +1,83 @@
-//! The figure of a panel: as it is on the screen, or, where it is not, drawn apart at a size of its own; with a line
-//! that says what it is of, where that is wanted; as a file with a name that says the same.
+//! The figure of a panel as a file: as on the screen, or rendered separately if the panel is not visible or the figure is
+//! for a paper; optionally with a caption above it. Its file name has the same information.
 
 use egui::epaint::{ClippedShape, TextShape};
 use egui::{Context, FontDefinitions, Frame, LayerId, Margin, RawInput, Rect, Stroke, Vec2, pos2, vec2};
 
 use crate::command::Zoomable;
 use crate::drawing::view2d::View2d;
-use crate::figure::wish::{Kind, Sheet, Wish};
+use crate::figure::request::{FigureFormat, FigurePage, FigureRequest};
 use crate::figure::{Figure, Form, Ink, Piece, bitmap, shapes, svg, words};
 use crate::layout::show_pane;
 use crate::panels::bars::state_word;
 use crate::panels::pane::Pane;
 use crate::state::{State, run_letter};
-use crate::theme::{self, Looks};
+use crate::theme::{self, ColourTheme};
 
-/// Size of the figure of a panel that is not on the screen, points.
+/// Size of the figure of a panel that is not visible, points.
 const APART: Vec2 = vec2(720.0, 480.0);
 /// Height at which a panel shows all of a list, points.
 const TALL: f32 = 3000.0;
-/// Frames that are painted of it: the first ones only measure.
+/// Frames painted of an off-screen panel: the first ones only measure.
 const FRAMES: usize = 3;
-/// Maximum height of a figure in its widths.
+/// Maximum ratio of height to width of a figure.
 const ASPECT_MAX: f32 = 1.5;
-/// Maximum room above and below an image for marks that reach beyond it, points.
+/// Maximum space above and below an image for marks that extend beyond it, points.
 const MARK_ROOM: f32 = 24.0;
-/// Room around the words of the line above a figure, points.
+/// Space around the text of the caption, points.
 const ROOM: f32 = 5.0;
 
 /// A figure as a file.
 #[derive(Clone, Debug)]
 pub(crate) struct File {
-    /// Its name.
+    /// The file name.
     pub name: String,
-    /// What it is, for a browser.
+    /// The media type.
     pub media_type: &'static str,
-    /// Its contents.
+    /// The contents.
     pub bytes: Vec<u8>,
-    /// What is to be said of it.
+    /// The message to the user.
     pub sentence: String,
 }
 
-/// Makes the file; `places` are the panels on the screen, points.
+/// Creates the file; `places` are the visible panels with their rectangles, points.
 ///
 /// # Errors
-/// A sentence when it would be too large.
+/// A sentence if it would be too large.
 pub(crate) fn take(
     context: &Context,
     state: &State,
     places: &[(Pane, Rect)],
-    wish: Wish,
+    request: FigureRequest,
 ) -> Result<File, String> {
-    let scale = if let Kind::Png(scale) = wish.kind { scale } else { 1 };
-    let place = places.iter().find(|(pane, _)| *pane == wish.pane).map(|(_, place)| *place);
+    let scale = if let FigureFormat::Png(scale) = request.kind { scale } else { 1 };
+    let place = places.iter().find(|(pane, _)| *pane == request.pane).map(|(_, place)| *place);
     let figure = match (state.exports.sheet, place) {
-        (Sheet::Screen, Some(place)) => of_layer(context, state, place, f32::from(scale)),
-        (Sheet::Screen, None) => apart(state, wish.pane, f32::from(scale), APART),
-        (Sheet::Paper(width), place) => on_paper(state, wish.pane, f32::from(scale), f32::from(width), place),
+        (FigurePage::Screen, Some(place)) => of_layer(context, state, place, f32::from(scale)),
+        (FigurePage::Screen, None) => apart(state, request.pane, f32::from(scale), APART),
+        (FigurePage::Paper(width), place) => {
+            on_paper(state, request.pane, f32::from(scale), f32::from(width), place)
+        }
     };
-    let figure = named(context, state, wish.pane, figure);
+    let figure = named(context, state, request.pane, figure);
     let fonts = fonts(context);
-    let (bytes, size, media_type) = match wish.kind {
-        Kind::Svg => {
+    let (bytes, size, media_type) = match request.kind {
+        FigureFormat::Svg => {
             let size = format!("{:.0} × {:.0} points", figure.size.x, figure.size.y);
             (svg::text(&figure)?.into_bytes(), size, "image/svg+xml")
         }
-        Kind::Png(scale) => {
+        FigureFormat::Png(scale) => {
             let [width, height] = bitmap::size_px(&figure, scale)?;
             (bitmap::png(&figure, scale, &fonts)?, format!("{width} × {height} px"), "image/png")
         }
     };
-    let name = file_name(state, wish);
+    let name = file_name(state, request);
     let mut sentence = format!("Saved {name}: {size}, {} kB.", bytes.len().div_ceil(1000));
     if place.is_none() {
-        sentence +=
-            &format!(" {} is not on the screen: it was drawn apart, with what is loaded.", wish.pane.title());
+        sentence += &format!(
+            " {} is not on the screen: it was drawn apart, with what is loaded.",
+            request.pane.title()
+        );
     }
     if figure.left_out > 0 {
         sentence += &format!(" {} shapes could not be taken over.", figure.left_out);
@@ -81,12 +85,12 @@ pub(crate) fn take(
     Ok(File { name, media_type, bytes, sentence })
 }
 
-/// What the fonts are.
+/// The font definitions of the page.
 pub(crate) fn fonts(context: &Context) -> FontDefinitions {
     context.fonts(|fonts| fonts.definitions().clone())
 }
 
-/// What is painted inside a rectangle of the layer of the panels.
+/// The shapes inside a rectangle of the panels' layer.
 pub(crate) fn of_layer(context: &Context, state: &State, place: Rect, scale: f32) -> Figure {
     let painted: Vec<ClippedShape> = context.graphics(|layers| {
         layers
@@ -97,12 +101,11 @@ pub(crate) fn of_layer(context: &Context, state: &State, place: Rect, scale: f32
     shapes::figure(&painted, place, scale, &|id| state.pixels_of(id))
 }
 
-/// A panel for a paper: white, without controls, `width` points wide, and so high that all of a list or an image is on
-/// it.
+/// A panel for a paper: white, without controls, `width` points wide, and high enough for a whole list or image.
 fn on_paper(state: &State, pane: Pane, scale: f32, width: f32, place: Option<Rect>) -> Figure {
-    let looks = theme::looks();
+    let colour_theme = theme::colour_theme();
     super::ON_PAPER.set(true);
-    theme::choose(Looks::Light);
+    theme::choose(ColourTheme::Light);
     let aspect = place.map_or(APART.y / APART.x, |place| place.height() / place.width().max(1.0));
     let height = (width * aspect.clamp(0.3, ASPECT_MAX)).round();
     let view = match pane {
@@ -122,15 +125,15 @@ fn on_paper(state: &State, pane: Pane, scale: f32, width: f32, place: Option<Rec
         }
     };
     super::ON_PAPER.set(false);
-    theme::choose(looks);
+    theme::choose(colour_theme);
     figure
 }
 
-/// An image panel that is as high as its image: drawn once to measure the image, then without the blank bands.
+/// An image panel with the height of its image: rendered once to measure the image, then without blank bands.
 fn of_image(state: &State, pane: Pane, scale: f32, size: Vec2) -> Figure {
     let measured = apart(state, pane, scale, size);
     let Some((canvas, blank)) = canvas_of(&measured) else {
-        // There is no image: the panel says why.
+        // There is no image: the panel shows the reason.
         let height = end_of_list(&measured).unwrap_or(size.y);
         return Figure { size: vec2(size.x, height), ..measured };
     };
@@ -140,7 +143,7 @@ fn of_image(state: &State, pane: Pane, scale: f32, size: Vec2) -> Figure {
     Figure { size: vec2(size.x, height.min(figure.size.y).round()), ..figure }
 }
 
-/// The area in which an image is painted, and how much of its height neither the image nor its marks use, points.
+/// The area of an image, and the part of its height that neither the image nor its marks use, points.
 fn canvas_of(figure: &Figure) -> Option<(Rect, f32)> {
     let is_picture = |piece: &Piece| matches!(piece.ink, Ink::Picture { .. });
     let first = figure.pieces.iter().position(is_picture)?;
@@ -156,20 +159,20 @@ fn canvas_of(figure: &Figure) -> Option<(Rect, f32)> {
     Some((canvas, (canvas.height() - 2.0 * used).max(0.0)))
 }
 
-/// Where the contents of a tall figure end; `None` for a panel that fills any height, such as a plot or an image.
+/// The lower end of a tall figure's contents; `None` for a panel that fills any height, such as a plot or an image.
 fn end_of_list(tall: &Figure) -> Option<f32> {
     let all = Rect::from_min_size(pos2(0.0, 0.0), tall.size);
     let seen = tall.pieces.iter().map(|piece| piece.ink.bounds().intersect(piece.clip).intersect(all));
-    // The ground is no contents.
+    // The background is not part of the contents.
     let contents = seen.filter(|bounds| bounds.is_positive() && bounds.height() < 0.9 * tall.size.y);
     let end = contents.map(|bounds| bounds.bottom()).fold(0.0, f32::max);
     (end > 0.0 && end < 0.9 * tall.size.y).then(|| (end + f32::from(theme::MARGIN)).ceil())
 }
 
-/// A panel painted where nobody sees it.
+/// Paints a panel off-screen.
 fn apart(state: &State, pane: Pane, scale: f32, size: Vec2) -> Figure {
     let context = Context::default();
-    theme::apply(&context, theme::looks());
+    theme::apply(&context, theme::colour_theme());
     let screen = Rect::from_min_size(pos2(0.0, 0.0), size);
     let paper = if super::is_on_paper() { theme::well() } else { theme::panel() };
     let mut painted = Vec::new();
@@ -178,7 +181,7 @@ fn apart(state: &State, pane: Pane, scale: f32, size: Vec2) -> Figure {
         let mut output = context.run_ui(input, |ui| {
             let ground = Frame::new().fill(paper).inner_margin(Margin::same(theme::MARGIN));
             ground.show(ui, |ui| {
-                // What it asks for is nobody's wish.
+                // Its commands are discarded.
                 show_pane(ui, pane, state, &mut Vec::new());
                 ui.take_available_space();
             });
@@ -189,7 +192,7 @@ fn apart(state: &State, pane: Pane, scale: f32, size: Vec2) -> Figure {
     Figure { ground: paper, ..shapes::figure(&painted, screen, scale, &|id| state.pixels_of(id)) }
 }
 
-/// The figure with its title and description, and the line above it where that is wanted.
+/// Adds title and description to the figure, and the caption if enabled.
 fn named(context: &Context, state: &State, pane: Pane, mut figure: Figure) -> Figure {
     let of = place_words(state);
     figure.title = if of.is_empty() { pane.title().to_owned() } else { format!("{}: {of}", pane.title()) };
@@ -205,7 +208,7 @@ fn named(context: &Context, state: &State, pane: Pane, mut figure: Figure) -> Fi
     figure
 }
 
-/// Drive, target, run and step.
+/// Drive, target, run and step, for the title.
 pub(crate) fn place_words(state: &State) -> String {
     let Some(traverse) = &state.traverse else { return String::new() };
     let run = state.target().map(|target| format!(", {} run {}", target.label, run_letter(state.cursor.run)));
@@ -213,7 +216,7 @@ pub(crate) fn place_words(state: &State) -> String {
     format!("{}{}, step {} of {last}", traverse.name, run.unwrap_or_default(), state.cursor.step)
 }
 
-/// Puts a line of words above a figure.
+/// Puts a caption above a figure.
 fn under_a_line(context: &Context, figure: Figure, words: String) -> Figure {
     let width = (figure.size.x - 2.0 * ROOM).max(40.0);
     let (font, colour) = (theme::image_font(), theme::text());
@@ -229,8 +232,8 @@ fn under_a_line(context: &Context, figure: Figure, words: String) -> Figure {
     Figure { size: figure.size + down, pieces, ..figure }
 }
 
-/// A file's name: session, target, run, step, panel, and the scale of a picture.
-pub(crate) fn file_name(state: &State, wish: Wish) -> String {
+/// The file name: session, target, run, step, panel, and the scale of a PNG.
+pub(crate) fn file_name(state: &State, request: FigureRequest) -> String {
     let mut parts = vec!["sightline".to_owned()];
     parts.extend(state.session.as_ref().map(|session| session.id.clone()));
     if let Some(target) = state.cursor.target {
@@ -240,10 +243,10 @@ pub(crate) fn file_name(state: &State, wish: Wish) -> String {
     if state.session.is_some() {
         parts.push(format!("step-{}", state.cursor.step));
     }
-    parts.push(wish.pane.title().to_owned());
-    let ending = match wish.kind {
-        Kind::Svg => ".svg".to_owned(),
-        Kind::Png(scale) => format!("-{scale}x.png"),
+    parts.push(request.pane.title().to_owned());
+    let ending = match request.kind {
+        FigureFormat::Svg => ".svg".to_owned(),
+        FigureFormat::Png(scale) => format!("-{scale}x.png"),
     };
     let name = parts.join("-").to_lowercase();
     let plain: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();

@@ -1,8 +1,8 @@
-//! egui's shapes as inks, cut to a rectangle.
+//! Converts egui's shapes to inks, clipped to a rectangle.
 //!
-//! Rectangles and upright lines are put on whole pixels of the scale at which they will be drawn, as egui does on the
-//! screen: a line one point wide stays sharp. Triangles of a mesh get the mean of their corners' colours; two that make
-//! an upright rectangle become one.
+//! Rectangles and axis-aligned lines are snapped to pixels of the output scale, as egui does on the screen, so that a line
+//! one point wide stays sharp. Triangles of a mesh get the mean of their corners' colours; two that form an axis-aligned
+//! rectangle are merged.
 
 use std::sync::Arc;
 
@@ -14,23 +14,23 @@ use egui::{Color32, ColorImage, Pos2, Rect, Shape, Stroke, TextureId, Vec2, pos2
 
 use crate::figure::{Figure, Form, Ink, Piece, words};
 
-/// Finds the pixels of a texture.
+/// Returns the pixels of a texture; `None` if unknown.
 pub(crate) type Textures<'a> = &'a dyn Fn(TextureId) -> Option<ColorImage>;
 
-/// Widest line that closes the seam between two triangles, points.
+/// Width of the line that closes the seam between two triangles, points.
 const SEAM: f32 = 0.5;
 
-/// Gathers inks.
+/// Collects inks.
 pub(crate) struct Gatherer<'a> {
     textures: Textures<'a>,
     scale: f32,
     pieces: Vec<Piece>,
     left_out: usize,
-    /// Where shapes are cut at the moment.
+    /// The current clip rectangle.
     clip: Rect,
 }
 
-/// What was painted inside `frame`; `scale` is how many pixels a point will have.
+/// The figure of the shapes inside `frame`; `scale` is the number of output pixels per point.
 pub(crate) fn figure<'s>(
     shapes: impl IntoIterator<Item = &'s ClippedShape>,
     frame: Rect,
@@ -95,7 +95,7 @@ impl Gatherer<'_> {
             }
             Shape::Mesh(mesh) => self.mesh(mesh),
             Shape::QuadraticBezier(curve) => {
-                // A quadratic curve is a cubic one whose handles are two thirds as long.
+                // A quadratic curve is a cubic one with handles of two thirds of the length.
                 let [first, handle, last] = curve.points;
                 let towards = |end: Pos2| end + (handle - end) * (2.0 / 3.0);
                 let points = [first, towards(first), towards(last), last];
@@ -122,7 +122,7 @@ impl Gatherer<'_> {
         }
     }
 
-    /// A line, put on whole pixels where it is upright.
+    /// A line, snapped to pixels if it is horizontal or vertical.
     fn segment(&mut self, [mut from, mut to]: [Pos2; 2], stroke: Stroke) {
         if from.x == to.x {
             stroke.round_center_to_pixel(self.scale, &mut from.x);
@@ -204,7 +204,7 @@ impl Gatherer<'_> {
         self.area(Form::Lines(outline, true), colour, seam(colour));
     }
 
-    /// A texture in a rectangle: only the part of it that is seen is taken.
+    /// A texture in a rectangle; only its visible part is stored.
     fn picture(&mut self, id: TextureId, place: Rect, uv: Rect, tint: Color32) {
         if !place.is_positive() || !place.intersects(self.clip) {
             return;
@@ -243,7 +243,7 @@ impl Gatherer<'_> {
     }
 }
 
-/// What closes the seam of a part of a mesh: two opaque neighbours would let what lies behind them shine through.
+/// The stroke that closes the seam between opaque parts of a mesh, through which the background would be visible.
 fn seam(colour: Color32) -> Stroke {
     if colour.is_opaque() { Stroke::new(SEAM, colour) } else { Stroke::NONE }
 }
@@ -254,7 +254,7 @@ fn mean_of(corners: &[Vertex], of: fn(&Color32) -> u8) -> u8 {
     (sum / corners.len().max(1)) as u8
 }
 
-/// The stroke of a path in one colour: that of its first point where it changes along the way.
+/// The stroke of a path in one colour; for a varying colour, that of its first point.
 fn plain(stroke: &PathStroke, points: &[Pos2]) -> Stroke {
     let colour = match &stroke.color {
         ColorMode::Solid(colour) => *colour,
@@ -281,7 +281,7 @@ fn turned(rect: Rect, radii: [f32; 4], angle: f32) -> Form {
     Form::Lines(corners.map(|corner| rect.center() + turn * (corner - rect.center())).to_vec(), true)
 }
 
-/// The upright rectangle that two triangles make, with the part of the texture that it shows.
+/// The axis-aligned rectangle that two triangles form, with its texture coordinates; `None` if they form none.
 fn upright(pair: &[Vertex]) -> Option<(Rect, Rect)> {
     let place = Rect::from_points(&pair.iter().map(|corner| corner.pos).collect::<Vec<_>>());
     let is_corner = |corner: &Vertex| {

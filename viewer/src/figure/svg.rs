@@ -1,7 +1,7 @@
-//! A figure as an SVG file (SVG 1.1): self-contained, well-formed, words as words.
+//! A figure as an SVG file (SVG 1.1): self-contained, with text as text.
 //!
-//! Words carry their length (`textLength`), so that they end where they end on the screen whichever font the reader
-//! has. Pictures are embedded as PNG; magnified ones keep their pixels.
+//! Text has its length (`textLength`), so that it has the same extent as on the screen with any font. Images are embedded
+//! as PNG; magnified ones are shown without interpolation.
 
 use std::collections::HashMap;
 use std::fmt::Write;
@@ -12,14 +12,14 @@ use egui::{Color32, FontFamily, Pos2, Rect, Stroke};
 
 use crate::figure::{Figure, Form, Ink, Words};
 
-/// Fonts that stand in where the page's own are missing.
+/// Font families, with substitutes for the page's own.
 const PROPORTIONAL: &str = "Ubuntu, 'Ubuntu Light', 'DejaVu Sans', Verdana, sans-serif";
 const MONOSPACE: &str = "Hack, 'DejaVu Sans Mono', Menlo, Consolas, monospace";
 
-/// The file's text.
+/// The text of the file.
 ///
 /// # Errors
-/// A sentence when a picture cannot be encoded.
+/// A sentence if an image cannot be encoded.
 pub(crate) fn text(figure: &Figure) -> Result<String, String> {
     let [width, height] = [figure.size.x, figure.size.y].map(number);
     let mut body = String::new();
@@ -76,7 +76,7 @@ pub(crate) fn text(figure: &Figure) -> Result<String, String> {
 }
 
 fn line(text: &mut String, words: std::fmt::Arguments<'_>) {
-    // A text in memory takes whatever is written.
+    // Writing to a string cannot fail.
     writeln!(text, "{words}").unwrap_or_default();
 }
 
@@ -102,7 +102,7 @@ fn ink(body: &mut String, ink: &Ink) -> Result<(), String> {
     Ok(())
 }
 
-/// The beginning of the element of a form.
+/// The start tag of a form's element, without its end.
 fn open(form: &Form) -> String {
     match form {
         Form::Rect(rect, radii) if radii.iter().all(|radius| *radius == radii[0]) => {
@@ -141,7 +141,7 @@ fn open(form: &Form) -> String {
     }
 }
 
-/// A rectangle with a radius of its own at every corner.
+/// A rectangle with four different corner radii.
 fn rounded(rect: Rect, [nw, ne, se, sw]: [f32; 4]) -> String {
     let corner = |x: f32, y: f32, radius: f32, to: Pos2| {
         format!("L{} {}A{r} {r} 0 0 1 {}", number(x), number(y), pair(to), r = number(radius))
@@ -187,7 +187,7 @@ fn drawn(stroke: &Stroke) -> String {
     format!("{} stroke-width=\"{}\"", paint("stroke", stroke.color), number(stroke.width))
 }
 
-/// A colour as attributes: `fill` or `stroke`, and its opacity.
+/// A colour as attributes: `what` is `fill` or `stroke`; with its opacity.
 fn paint(what: &str, colour: Color32) -> String {
     if colour.a() == 0 {
         return format!(" {what}=\"none\"");
@@ -210,14 +210,14 @@ fn pair(at: Pos2) -> String {
     format!("{} {}", number(at.x), number(at.y))
 }
 
-/// A number with what a thousandth of a point needs, and no more.
+/// A number with at most three decimals.
 fn number(value: f32) -> String {
     let text = format!("{value:.3}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
-/// Words as XML takes them; signs that it does not have at all become blanks.
+/// Text escaped for XML; characters that XML does not allow become blanks.
 fn escaped(words: &str) -> String {
     let mut text = String::with_capacity(words.len());
     for c in words.chars() {

@@ -1,15 +1,15 @@
-//! Figures for a paper: letters, descriptions, legends, sizes and the resolution of PNG files.
+//! Figures for papers: letters, descriptions, legends, sizes and the resolution of PNG files.
 
 use egui::epaint::TextShape;
 use egui::{Color32, Rect, pos2, vec2};
 
-use crate::cache::{Eye, Item};
+use crate::cache::{ImageSide, Item};
 use crate::command::Layer;
 use crate::drawing::raster::Raster;
-use crate::figure::wish::{Kind, Wish};
+use crate::figure::request::{FigureFormat, FigureRequest};
 use crate::figure::{Figure, Ink, Piece, Words, bitmap, save, words};
+use crate::hovered::Hovered;
 use crate::panels::pane::Pane;
-use crate::pointed::Pointed;
 use crate::state::State;
 use crate::tests::fixture::{self, PIXEL};
 use crate::theme;
@@ -17,12 +17,12 @@ use crate::theme;
 /// A context with the fonts of the page.
 fn context() -> egui::Context {
     let context = egui::Context::default();
-    theme::apply(&context, theme::Looks::Dark);
+    theme::apply(&context, theme::ColourTheme::Dark);
     context.run_ui(egui::RawInput::default(), |_| {}).textures_delta.clear();
     context
 }
 
-/// A text at 11 points as the page lays it out.
+/// A text at 11 points in the page's layout.
 fn laid_out(context: &egui::Context, text: &str) -> TextShape {
     let galley =
         context.fonts_mut(|fonts| fonts.layout_no_wrap(text.to_owned(), theme::image_font(), theme::text()));
@@ -36,7 +36,7 @@ fn words_of(context: &egui::Context, text: &str) -> Words {
     words.clone()
 }
 
-/// A figure of words, or an empty one.
+/// A figure of a text, or an empty one.
 fn figure_of(words: Option<Words>) -> Figure {
     let size = vec2(180.0, 22.0);
     let clip = Rect::from_min_size(pos2(0.0, 0.0), size);
@@ -50,23 +50,23 @@ fn figure_of(words: Option<Words>) -> Figure {
     }
 }
 
-/// The grey values of words at four times their size.
+/// The grey values of a text at four times its size.
 fn painted(context: &egui::Context, name: &str, words: Words) -> image::GrayImage {
     let png = bitmap::png(&figure_of(Some(words)), 4, &save::fonts(context)).unwrap();
     super::figures::keep(name, &png);
     image::load_from_memory(&png).unwrap().to_luma8()
 }
 
-/// The file of a panel, which is on the screen in `place`.
-fn file(state: &State, pane: Pane, place: Rect, kind: Kind) -> save::File {
-    let file = save::take(&context(), state, &[(pane, place)], Wish { pane, kind }).unwrap();
+/// The file of a panel that is visible in `place`.
+fn file(state: &State, pane: Pane, place: Rect, kind: FigureFormat) -> save::File {
+    let file = save::take(&context(), state, &[(pane, place)], FigureRequest { pane, kind }).unwrap();
     super::figures::keep(&file.name, &file.bytes);
     file
 }
 
 fn svg(state: &State, pane: Pane) -> String {
     let place = Rect::from_min_size(pos2(0.0, 0.0), vec2(500.0, 300.0));
-    String::from_utf8(file(state, pane, place, Kind::Svg).bytes).unwrap()
+    String::from_utf8(file(state, pane, place, FigureFormat::Svg).bytes).unwrap()
 }
 
 /// The drive at step 2 with a left image four times as wide as high.
@@ -77,8 +77,8 @@ fn with_wide_image(context: &egui::Context) -> State {
     });
     let bytes = sightline_vision::image::io::encode_png_u8(&image).unwrap();
     let raster = Raster::from_png(context, "left", &bytes).unwrap();
-    let key = state.image_key(2, Eye::Left).unwrap();
-    state.cache.arrived(key, Ok(Item::Raster(std::sync::Arc::new(raster))), 0.0);
+    let key = state.image_key(2, ImageSide::Left).unwrap();
+    state.cache.store(key, Ok(Item::Raster(std::sync::Arc::new(raster))), 0.0);
     state
 }
 
@@ -121,9 +121,9 @@ fn the_legend_of_an_image_has_the_colours_of_its_marks() {
     for pane in [Pane::Left, Pane::Right] {
         let mut state = fixture::at_step(&context(), 2);
         let text = svg(&state, pane);
-        theme::choose(theme::Looks::Light);
+        theme::choose(theme::ColourTheme::Light);
         let light = hex(theme::search());
-        theme::choose(theme::Looks::Dark);
+        theme::choose(theme::ColourTheme::Dark);
         assert!(text.contains(&hex(theme::search())) && !text.contains(&light), "{pane:?}: {light}");
         let word = if pane == Pane::Left { "search window" } else { "epipolar curve, range in m" };
         assert!(text.contains(&format!(">{word}</text>")), "{pane:?}");
@@ -142,13 +142,13 @@ fn the_figure_of_an_image_ends_with_the_image() {
     let context = context();
     let wide = with_wide_image(&context);
     let tall_panel = Rect::from_min_size(pos2(0.0, 0.0), vec2(500.0, 800.0));
-    let png = file(&wide, Pane::Left, tall_panel, Kind::Png(1)).bytes;
+    let png = file(&wide, Pane::Left, tall_panel, FigureFormat::Png(1)).bytes;
     let height = image::load_from_memory(&png).unwrap().height();
     // The image is 712 × 178 points; then the legend, and at most 24 points on either side for marks.
     assert!((178..270).contains(&height), "{height}");
     assert!(!svg(&wide, Pane::Left).contains(">×"), "the magnification on the screen");
     let square = fixture::at_step(&context, 2);
-    let png = file(&square, Pane::Right, tall_panel, Kind::Png(1)).bytes;
+    let png = file(&square, Pane::Right, tall_panel, FigureFormat::Png(1)).bytes;
     let height = image::load_from_memory(&png).unwrap().height();
     assert!((712..800).contains(&height), "{height}");
 }
@@ -157,7 +157,7 @@ fn the_figure_of_an_image_ends_with_the_image() {
 fn an_image_panel_without_an_image_is_as_high_as_its_sentence() {
     let state = fixture::without_target();
     let panel = Rect::from_min_size(pos2(0.0, 0.0), vec2(500.0, 300.0));
-    let png = file(&state, Pane::Left, panel, Kind::Png(1)).bytes;
+    let png = file(&state, Pane::Left, panel, FigureFormat::Png(1)).bytes;
     assert!(image::load_from_memory(&png).unwrap().height() < 300);
 }
 
@@ -165,7 +165,7 @@ fn an_image_panel_without_an_image_is_as_high_as_its_sentence() {
 fn the_strip_has_room_for_the_pointed_patch_only_while_pointed() {
     let mut state = fixture::at_step(&context(), 2);
     assert!(!svg(&state, Pane::Strip).contains("at the pointer"));
-    state.pointed = Some(Pointed::Left(PIXEL));
+    state.hovered = Some(Hovered::Left(PIXEL));
     assert!(svg(&state, Pane::Strip).contains("at the pointer"));
 }
 
@@ -180,7 +180,7 @@ fn the_legend_of_plots_names_the_current_step_with_filled_marks() {
 #[test]
 fn a_png_stores_its_resolution() {
     let png = |scale| bitmap::png(&figure_of(None), scale, &egui::FontDefinitions::default()).unwrap();
-    // 72 dpi are 2835 pixels per metre; the last four bytes are the checksum of every such chunk.
+    // 72 dpi is 2835 pixels per metre; the last four bytes are the chunk's checksum.
     let at_one = b"\0\0\0\x09pHYs\0\0\x0b\x13\0\0\x0b\x13\x01\0\x9a\x9c\x18";
     assert_eq!(&png(1)[33..54], at_one);
     assert_eq!(&png(2)[41..45], 5669_u32.to_be_bytes(), "144 dpi");

@@ -1,4 +1,4 @@
-//! egui's laid out text as words: one ink for every run of letters in one look on one line.
+//! egui's text layouts as inks: one per run of letters with the same format on one line.
 
 use egui::epaint::TextShape;
 use egui::epaint::text::{Glyph, PlacedRow, TextFormat};
@@ -6,24 +6,25 @@ use egui::{Color32, Stroke, Vec2, vec2};
 
 use crate::figure::{Form, Ink, Words};
 
-/// Widest difference between a place that egui rounded to whole pixels and the exact one, points.
+/// Maximum difference between a position that egui rounded to whole pixels and the exact one, points.
 const ROUNDING: f32 = 1.0;
 
-/// Letters of one look that stand beside each other.
+/// Consecutive letters with the same format.
 struct Run<'a> {
     format: &'a TextFormat,
-    /// Each letter with the x coordinate of its beginning in the row, points.
+    /// Each letter with the x coordinate of its start in the row, points.
     letters: Vec<(Glyph, f32)>,
 }
 
-/// The words of a text with what underlines them and lies behind them.
+/// The inks of a text, with its underlines and backgrounds.
 pub(crate) fn inks(shape: &TextShape) -> Vec<Ink> {
     let mut characters = shape.galley.job.text.char_indices().peekable();
     let mut inks = Vec::new();
     for row in &shape.galley.rows {
         let mut runs: Vec<Run<'_>> = Vec::new();
         for glyph in &row.row.glyphs {
-            // What was cut off ends in a sign that the text does not have: it looks like what is before it.
+            // An elided text ends in a character that is not in its source; it has the format of the last source
+            // character.
             let at = characters.next_if(|(_, c)| *c == glyph.chr || !shape.galley.elided);
             let at = at.map_or(shape.galley.job.text.len().saturating_sub(1), |(at, _)| at);
             let sections = &shape.galley.job.sections;
@@ -44,13 +45,13 @@ pub(crate) fn inks(shape: &TextShape) -> Vec<Ink> {
     inks
 }
 
-/// Returns the exact beginning of the letter that follows a run. egui rounds it to whole pixels of the screen, which
-/// shows at a larger scale.
+/// Returns the exact start of the letter that follows a run. egui rounds it to whole screen pixels, which is visible at a
+/// larger scale.
 fn next_x(run: &Run<'_>, glyph: &Glyph) -> f32 {
     let Some((last, x)) = run.letters.last() else { return glyph.pos.x };
     let spacing = if is_in_ligature(glyph) { 0.0 } else { run.format.extra_letter_spacing };
     let exact = x + last.advance_width + spacing;
-    // Rows that are justified have further space between words.
+    // Justified rows have additional space between words.
     if (exact - glyph.pos.x).abs() <= ROUNDING { exact } else { glyph.pos.x }
 }
 
@@ -60,7 +61,7 @@ fn is_in_ligature(glyph: &Glyph) -> bool {
 }
 
 impl Run<'_> {
-    /// Whether a letter goes on in the same look on the same baseline.
+    /// Whether a letter continues the run: same format, same baseline.
     fn continues(&self, format: &TextFormat, glyph: &Glyph) -> bool {
         std::ptr::eq(self.format, format)
             && self.letters.last().is_some_and(|(last, _)| last.pos.y == glyph.pos.y)

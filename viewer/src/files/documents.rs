@@ -1,7 +1,7 @@
-//! What a file is that was dropped on the page or chosen, and what can be done with it.
+//! Recognises the type of a file that was dropped on the page or chosen.
 //!
-//! Three looks, each cheaper than the next: at the number of files, at name and size before a byte is read, and at the
-//! contents. What cannot be opened gets one sentence that names the file and says what to do instead.
+//! Three checks, cheapest first: the number of files, name and size before a byte is read, and the contents. A file that
+//! cannot be opened gets one sentence that names the file and gives a remedy.
 
 use std::path::Path;
 
@@ -15,20 +15,20 @@ use sightline_track::settings::{Changes, Settings};
 use sightline_world::Scenario;
 use sightline_world::toml_text;
 
-/// The largest JSON file that is read, bytes: the largest session that the server takes by default.
+/// The largest JSON file that is read, bytes: the largest session that the server accepts by default.
 pub(crate) const JSON_LIMIT: u64 = FILE_BYTES as u64;
-/// The largest other file that is read, bytes: scenarios and configurations have a few thousand.
+/// The largest other file that is read, bytes; scenarios and configurations have a few thousand.
 pub(crate) const TEXT_LIMIT: u64 = 512 << 10;
-/// How many characters of a file's name are shown.
+/// Maximum number of characters of a file name that are shown.
 const NAME_SHOWN: usize = 60;
 
-/// How a folder is opened, as the end of a sentence.
+/// How to open a folder, as the end of a sentence.
 const OPEN_FOLDER: &str = "press Open (Ctrl+O) and choose its folder there; for a folder on the server's machine, start \
                            the server with `sightline serve --recordings FOLDER`";
 /// The text files of a KITTI recording.
 const KITTI_FILES: [&str; 3] = ["calib.txt", "poses.txt", "times.txt"];
 
-/// What can be opened, each with what comes of it.
+/// The file types that can be opened, each with the effect of opening it.
 pub(crate) const OPENABLE: [(&str, &str); 4] = [
     ("a scenario (.toml)", "opens the simulated drive that it describes"),
     ("reproduce.json of an export", "begins that session again: drive, targets, runs, breakpoints, notes"),
@@ -36,20 +36,20 @@ pub(crate) const OPENABLE: [(&str, &str); 4] = [
     ("a list of breakpoints (.json)", "is added to the breakpoints of this session"),
 ];
 
-/// What a file is.
+/// The contents of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Document {
     /// A simulated drive; the scenario as TOML.
     Drive(String),
-    /// A session from elsewhere.
+    /// An exported session.
     Session(Box<Opened>),
-    /// A tracker configuration: what differs from the defaults.
+    /// A tracker configuration: the changes from the defaults.
     Settings(Changes),
-    /// Conditions, each with whether it is on.
+    /// Conditions, each with whether it is enabled.
     Breakpoints(Vec<(String, bool)>),
 }
 
-/// A file's name as it can be shown: short, and without signs that move the line.
+/// A file's name for display: shortened, and without control characters.
 pub(crate) fn shown(name: &str) -> String {
     let plain: String = name.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
     let count = plain.chars().count();
@@ -64,7 +64,7 @@ pub(crate) fn shown(name: &str) -> String {
 /// Refuses more than one file.
 ///
 /// # Errors
-/// The sentence.
+/// The message to the user.
 pub(crate) fn only_one(names: &[String]) -> Result<(), String> {
     match names {
         [_] | [] => Ok(()),
@@ -75,10 +75,10 @@ pub(crate) fn only_one(names: &[String]) -> Result<(), String> {
     }
 }
 
-/// Judges a file by its name and size, before it is read.
+/// Checks a file's name and size, before it is read.
 ///
 /// # Errors
-/// The sentence.
+/// The message to the user.
 pub(crate) fn before_reading(name: &str, size_bytes: u64, is_folder: bool) -> Result<(), String> {
     let (file, ending) = (shown(name), ending(name));
     if is_folder {
@@ -103,7 +103,7 @@ pub(crate) fn before_reading(name: &str, size_bytes: u64, is_folder: bool) -> Re
     Ok(())
 }
 
-/// What is said of a file that the browser or the system cannot read.
+/// The message for a file that the browser or the system cannot read.
 pub(crate) fn unreadable(name: &str) -> String {
     format!("{} cannot be read: if it is a folder, {OPEN_FOLDER}; else check who may read it.", shown(name))
 }
@@ -121,7 +121,7 @@ fn megabytes(bytes: u64) -> String {
     if megabytes < 10.0 { format!("{megabytes:.1}") } else { format!("{megabytes:.0}") }
 }
 
-/// What a file of another kind is, as the end of a sentence.
+/// The description of a file of another type, as the end of a sentence; `None` if its contents must be read.
 fn other_kind(name: &str, ending: &str) -> Option<String> {
     let session = "drop the reproduce.json of the same session to open that";
     Some(match ending {
@@ -147,10 +147,10 @@ fn index() -> String {
     format!("is the index of a drive whose images are beside it: {OPEN_FOLDER}.")
 }
 
-/// Finds out what the contents are.
+/// Recognises and parses the contents.
 ///
 /// # Errors
-/// One sentence that names the file and says what to do.
+/// One sentence that names the file and gives a remedy.
 pub(crate) fn read(name: &str, bytes: &[u8]) -> Result<Document, String> {
     let file = shown(name);
     let no_text =
@@ -225,19 +225,19 @@ fn of_toml(text: &str, ending: &str) -> Result<Document, String> {
     }
 }
 
-/// Whether a file has a field that scenarios have.
+/// Whether a file has a field of a scenario.
 fn of_scenario(map: &Map<String, Value>) -> bool {
     let known = serde_json::to_value(Scenario::demo()).unwrap_or_default();
     map.keys().any(|key| known.get(key).is_some())
 }
 
-/// Whether a file has a field that configurations have: a setting, or a group of them.
+/// Whether a file has a field of a configuration: a setting, a group of settings, or a preset.
 fn has_setting(map: &Map<String, Value>) -> bool {
     let table = Settings::table();
     map.keys().any(|key| key == "preset" || table.iter().any(|info| info.key == *key || info.group == *key))
 }
 
-/// A configuration: settings by name, or group by group as a run has them; beside a preset, what differs from it.
+/// Parses a configuration: settings by name, or grouped as in a run's record; with a preset, the changes from it.
 fn settings(map: &Map<String, Value>) -> Result<Document, String> {
     let table = Settings::table();
     let mut changes = Changes::new();
@@ -252,7 +252,7 @@ fn settings(map: &Map<String, Value>) -> Result<Document, String> {
                 let own = preset
                     .settings()
                     .map_err(|wrong| format!("names a preset that cannot be used: {wrong}."))?;
-                // What the file says itself counts more.
+                // Settings in the file override those of the preset.
                 own.changes().into_iter().for_each(|(key, value)| {
                     changes.entry(key).or_insert(value);
                 });
@@ -272,7 +272,7 @@ fn settings(map: &Map<String, Value>) -> Result<Document, String> {
     Ok(Document::Settings(whole.changes()))
 }
 
-/// Conditions as the interface lists them, or as plain texts.
+/// Parses conditions, as objects in the format of the API or as plain strings.
 fn breakpoints(list: &[Value]) -> Result<Document, String> {
     if list.is_empty() {
         return Err("lists no breakpoint: drop a list with at least one `expression`.".to_owned());

@@ -1,7 +1,7 @@
-//! Files on their way into the page: dropped on it, chosen in the browser's dialog, or named by their path.
+//! Files opened by the page: dropped on it, chosen in the browser's dialog, or named by path.
 //!
-//! Name and size are judged before a byte is read, so that a file of a gigabyte costs nothing. What was read, or the sentence
-//! why not, arrives through a channel.
+//! Name and size are checked before a byte is read, so that a file of a gigabyte costs nothing. The contents, or the
+//! reason for a refusal, arrive through a channel.
 
 use std::sync::mpsc::{Receiver, Sender, channel};
 
@@ -12,38 +12,38 @@ use crate::files::documents;
 #[cfg(target_arch = "wasm32")]
 use crate::page::web::RecordingFile;
 
-/// What came of a file.
+/// The outcome of opening a file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Arrival {
-    /// It is not read, and why.
+    /// The file is not read; the reason.
     Refused(String),
-    /// Its contents.
+    /// The contents of a file.
     Read {
-        /// Its name.
+        /// The file's name.
         name: String,
-        /// Its bytes.
+        /// The file's bytes.
         bytes: Vec<u8>,
     },
     /// A recording was chosen: a folder, or an archive.
     Chosen(Chosen),
-    /// So many files of the recording that was chosen are sent.
+    /// Number of files of the chosen recording that have been sent.
     Sent(usize),
-    /// A file of it was refused, and the others are not sent.
+    /// A file of the recording was refused; the rest is not sent.
     NotSent(Problem),
 }
 
-/// A recording that was chosen to be sent.
+/// A recording that was chosen for sending.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Chosen {
     /// The name of the folder or archive.
     pub name: String,
-    /// How many files it has; an archive is one.
+    /// Number of files; an archive counts as one.
     pub file_count: usize,
     /// Its size, bytes.
     pub bytes: u64,
 }
 
-/// Where files arrive.
+/// Receives opened files.
 pub(crate) struct Inbox {
     sender: Sender<Arrival>,
     receiver: Receiver<Arrival>,
@@ -53,7 +53,7 @@ pub(crate) struct Inbox {
 }
 
 impl Inbox {
-    /// Nothing has arrived; `context` is woken when something does.
+    /// Creates an empty inbox; repaints `context` when a file arrives.
     pub(crate) fn new(context: Context) -> Self {
         let (sender, receiver) = channel();
         let inbox = Self {
@@ -68,7 +68,7 @@ impl Inbox {
         inbox
     }
 
-    /// What arrived since the last time, with what was dropped in this frame.
+    /// The files that arrived since the last call, including those dropped in this frame.
     pub(crate) fn poll(&mut self) -> Vec<Arrival> {
         let dropped = self.context.input(|input| input.raw.dropped_files.clone());
         let names: Vec<String> = dropped.iter().map(|file| name_of(file.path())).collect();
@@ -89,7 +89,7 @@ impl Inbox {
     }
 }
 
-/// Hands something over and wakes the page; without a receiver the page is closing, and nobody waits for it.
+/// Sends an arrival and requests a repaint; a missing receiver means that the page is closing.
 fn tell(sender: &Sender<Arrival>, context: &Context, arrival: Arrival) {
     if sender.send(arrival).is_ok() {
         context.request_repaint();
@@ -134,7 +134,7 @@ impl Inbox {
         }
     }
 
-    /// Takes every folder that is dropped as a recording that was chosen.
+    /// Treats every dropped folder as a chosen recording.
     fn watch_folders(&self) {
         let (sender, context, outgoing) = (self.sender.clone(), self.context.clone(), self.outgoing.clone());
         crate::page::web::watch_folders(move |found| match found {
@@ -143,7 +143,7 @@ impl Inbox {
         });
     }
 
-    /// Lets the person choose the folder of a recording, or an archive of one.
+    /// Opens the browser's dialog for the folder of a recording, or for an archive of one.
     pub(crate) fn choose_recording(&self, is_archive: bool) {
         let (sender, context, outgoing) = (self.sender.clone(), self.context.clone(), self.outgoing.clone());
         crate::page::web::choose_recording(is_archive, move |files| {
@@ -151,18 +151,18 @@ impl Inbox {
         });
     }
 
-    /// Sends the recording that was chosen last.
+    /// Sends the last chosen recording.
     pub(crate) fn send_recording(&self, origin: &str, upload: String) {
         let (sender, context) = (self.sender.clone(), self.context.clone());
         self.outgoing.send(origin, upload, move |arrival| tell(&sender, &context, arrival));
     }
 
-    /// Sends no more of it.
+    /// Stops sending the recording.
     pub(crate) fn stop_sending(&self) {
         self.outgoing.stop();
     }
 
-    /// Lets the person choose a file in the browser's dialog.
+    /// Opens the browser's dialog for a file.
     pub(crate) fn choose(&self) {
         let (sender, context) = (self.sender.clone(), self.context.clone());
         crate::page::web::choose_file(move |file| read_file(file, sender, context));
@@ -172,7 +172,7 @@ impl Inbox {
 #[cfg(target_arch = "wasm32")]
 fn read_file(file: web_sys::File, sender: Sender<Arrival>, context: Context) {
     let name = file.name();
-    // What a browser gives for a folder cannot be told from a file until it is read.
+    // A browser presents a folder like a file until it is read.
     if let Err(why) = documents::before_reading(&name, file.size() as u64, false) {
         return tell(&sender, &context, Arrival::Refused(why));
     }

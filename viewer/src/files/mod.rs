@@ -1,6 +1,6 @@
-//! Opening: the window with recent sessions and drives, and what comes of a file that was dropped or chosen.
+//! Opening files: the window with recent sessions and drives, and the handling of dropped and chosen files.
 //!
-//! Whatever a file holds, the open session stays as it is until there is something better: a refusal changes nothing.
+//! The open session is not replaced until the new one is loaded; a refused file changes nothing.
 
 pub(crate) mod documents;
 pub(crate) mod inbox;
@@ -15,56 +15,56 @@ mod update;
 
 use sightline_api::wire::SessionEntry;
 
-/// What a person asks of files and sessions.
+/// A user request concerning files and sessions.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Ask {
-    /// Opens the window.
+pub enum FilesCommand {
+    /// Opens the window “Open”.
     Open,
-    /// Closes it.
+    /// Closes the window.
     Close,
-    /// Lets the person choose a file.
+    /// Opens the browser's file dialog.
     Choose,
-    /// Opens the file at this path; only where the page runs as a program of its own.
+    /// Opens the file at this path; only in the native program.
     Path(String),
-    /// Changes the path that is being typed.
+    /// Changes the path in the input field.
     Type(String),
-    /// Goes on with a session.
+    /// Opens an existing session.
     Resume(String),
     /// Begins a new session on a traverse.
     Begin(String),
     /// Removes a session.
     RemoveSession(Box<SessionEntry>),
-    /// Takes the removal of a session back.
+    /// Restores a removed session.
     RestoreSession(String),
-    /// Asks whether to remove a drive; none when not to.
+    /// Asks the user to confirm the removal of a drive; `None` cancels.
     ConfirmDrive(Option<String>),
     /// Removes a drive with its images.
     RemoveDrive(String),
-    /// Asks something of recordings.
-    Recording(recording::Ask),
-    /// Asks again for what of the cursor's stop could not be shown.
+    /// A request concerning recordings.
+    Recording(recording::RecordingCommand),
+    /// Retries loading the images of the cursor's stop.
     TryAgain,
 }
 
-/// What is known of files and sessions.
+/// The state of the window “Open”.
 #[derive(Clone, Debug, Default)]
 pub struct Files {
     /// Whether the window is open.
     pub is_open: bool,
-    /// The sessions, the one used last first; none before the server has said.
+    /// The sessions, most recently used first; `None` until the server has answered.
     pub recent: Option<Vec<SessionEntry>>,
-    /// Why there are none.
+    /// Why the list of sessions could not be loaded.
     pub refused: Option<String>,
     /// Whether files are dragged over the page.
     pub is_hovered: bool,
-    /// The file that the server works on.
+    /// The file that the server is opening.
     pub opening: Option<String>,
-    /// The path that is being typed.
+    /// The path in the input field.
     pub path: String,
     /// The recordings on the server's machine.
     pub recordings: recording::Recordings,
-    /// The sessions that were removed here and can be restored, the last one at the end.
+    /// The sessions that this page removed and can restore, the latest at the end.
     pub removed: Vec<SessionEntry>,
-    /// The drive about whose removal the user is asked.
+    /// The drive whose removal the user is asked to confirm.
     pub confirming: Option<String>,
 }

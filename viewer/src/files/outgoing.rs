@@ -1,4 +1,4 @@
-//! Sends the files of a recording to the server, one after the other; the browser reads each from its disk while it is sent.
+//! Sends the files of a recording to the server, one after the other; the browser reads each from disk while it is sent.
 
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
@@ -11,17 +11,17 @@ use sightline_api::recording::UploadPath;
 use crate::files::inbox::{Arrival, Chosen};
 use crate::page::web::{self, RecordingFile};
 
-/// The recording that was chosen last.
+/// The last chosen recording.
 #[derive(Clone, Default)]
 pub(crate) struct Outgoing {
     files: Rc<RefCell<Vec<RecordingFile>>>,
     is_archive: Rc<Cell<bool>>,
-    /// The number of the choice that is being sent; another one ends the sending.
+    /// Generation counter; incrementing it ends a running transfer.
     number: Rc<Cell<u64>>,
 }
 
 impl Outgoing {
-    /// Keeps what was chosen and tells it.
+    /// Stores the chosen files and reports them.
     pub(crate) fn chosen(&self, files: Vec<RecordingFile>, is_archive: bool, tell: &dyn Fn(Arrival)) {
         let first = files.first().map(|file| file.path.as_str()).unwrap_or_default();
         let name = first.split('/').next().unwrap_or_default().to_owned();
@@ -33,12 +33,12 @@ impl Outgoing {
         tell(Arrival::Chosen(chosen));
     }
 
-    /// Sends no more files.
+    /// Stops sending.
     pub(crate) fn stop(&self) {
         self.number.set(self.number.get() + 1);
     }
 
-    /// Sends all files to an upload of this name, and tells how many are sent.
+    /// Sends all files to an upload, and reports the number of files sent.
     pub(crate) fn send(&self, origin: &str, upload: String, tell: impl Fn(Arrival) + 'static) {
         let (files, base) = (self.files.borrow().clone(), format!("{origin}/api/v1"));
         let (is_archive, number, own) = (self.is_archive.get(), self.number.clone(), self.number.get());

@@ -1,4 +1,4 @@
-//! Opening one's own recording: which there are, what one contains, its import, and the scenarios that come with the program.
+//! Opening recordings: their list, contents, upload and import, and the scenarios of the library.
 
 use sightline_api::endpoint::Call;
 use sightline_api::endpoints::{
@@ -16,68 +16,68 @@ use crate::files::inbox::Chosen;
 use crate::state::State;
 use crate::state::effect::Effect;
 
-/// What a person asks of recordings.
+/// A user request concerning recordings.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Ask {
-    /// Changes the path that is being typed.
+pub enum RecordingCommand {
+    /// Changes the path in the input field.
     Type(String),
-    /// Shows what the recording at a path contains.
+    /// Shows the contents of the recording at a path.
     Examine(String),
-    /// Imports the recording that is shown, and opens it.
+    /// Imports the recording shown, and opens it.
     Import,
     /// Cancels the import that this page started.
     Cancel,
-    /// Goes back to the list.
+    /// Returns to the list.
     Back,
-    /// Lets the person choose a folder, or an archive, that is sent to the server.
+    /// Opens the dialog for a folder, or an archive, to send to the server.
     Choose {
         /// Whether it is an archive.
         is_archive: bool,
     },
-    /// Sends no more of it.
+    /// Stops sending.
     StopSending,
-    /// Opens a scenario that comes with the program, by its name.
+    /// Opens a scenario of the library, by its name.
     Scenario(&'static str),
 }
 
-/// A recording that is sent to the server.
+/// A recording that is being sent to the server.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Sending {
-    /// What was chosen.
+    /// The chosen folder or archive.
     pub chosen: Chosen,
-    /// How many files are sent.
+    /// Number of files sent.
     pub sent: usize,
 }
 
-/// What is known of recordings.
+/// The state of the recordings in the window “Open”.
 #[derive(Clone, Debug, Default)]
 pub struct Recordings {
-    /// The recordings below the folders named at start; `None` before the server has said.
+    /// The recordings below the folders given at the server's start; `None` until the server has answered.
     pub list: Option<RecordingList>,
-    /// The path that is being typed.
+    /// The path in the input field.
     pub path: String,
-    /// The path whose contents the server looks for.
+    /// The path that the server is examining.
     pub examining: Option<String>,
-    /// The recording that is shown.
+    /// The recording shown.
     pub shown: Option<RecordingView>,
     /// Why the recording cannot be examined or imported.
     pub problem: Option<Problem>,
-    /// The recording that is sent.
+    /// The recording that is being sent.
     pub sending: Option<Sending>,
-    /// The upload that the server has of this page.
+    /// The upload on the server that belongs to this page.
     pub upload: Option<UploadView>,
-    /// What the person calls the folder or archive that was sent.
+    /// The user's name of the folder or archive that was sent.
     pub sent_name: String,
-    /// The folder of the recording that is shown, as the person knows it.
+    /// The folder of the recording shown, under the user's name for it.
     pub folder_name: String,
-    /// Whether the import of the recording that is shown was asked for and not answered yet.
+    /// Whether the import of the recording shown was requested and not yet answered.
     pub is_starting: bool,
-    /// The import that this page started and that has not ended.
+    /// The running import that this page started.
     pub import: Option<ImportJob>,
 }
 
 impl State {
-    /// Asks for the recordings.
+    /// Requests the list of recordings.
     pub(super) fn read_recordings(&mut self) {
         let call = Call::to::<ListRecordings>(&Anywhere {});
         self.call_with_problem::<ListRecordings>(call, |state, outcome| match outcome {
@@ -86,25 +86,27 @@ impl State {
         });
     }
 
-    /// Carries out what was asked.
-    pub(super) fn ask_of_recordings(&mut self, ask: Ask) {
-        match ask {
-            Ask::Type(path) => self.files.recordings.path = path,
-            Ask::Examine(path) => self.examine(path),
-            Ask::Import => self.import(),
-            Ask::Cancel => self.cancel_import(),
-            Ask::Back => {
+    /// Carries out a request.
+    pub(super) fn apply_recording_command(&mut self, command: RecordingCommand) {
+        match command {
+            RecordingCommand::Type(path) => self.files.recordings.path = path,
+            RecordingCommand::Examine(path) => self.examine(path),
+            RecordingCommand::Import => self.import(),
+            RecordingCommand::Cancel => self.cancel_import(),
+            RecordingCommand::Back => {
                 let recordings = &mut self.files.recordings;
                 (recordings.shown, recordings.problem) = (None, None);
                 self.remove_upload();
             }
-            Ask::Choose { is_archive } => self.outbox.add(Effect::ChooseRecording { is_archive }),
-            Ask::StopSending => {
+            RecordingCommand::Choose { is_archive } => {
+                self.outbox.add(Effect::ChooseRecording { is_archive })
+            }
+            RecordingCommand::StopSending => {
                 self.files.recordings.sending = None;
                 self.outbox.add(Effect::StopSending);
                 self.remove_upload();
             }
-            Ask::Scenario(name) => {
+            RecordingCommand::Scenario(name) => {
                 let Some(scenario) = library::toml(name) else { return };
                 self.open_drive(format!("The scenario {name}"), scenario.to_owned());
             }
@@ -119,11 +121,11 @@ impl State {
         self.call_with_problem::<ShowRecording>(call, move |state, outcome| {
             let recordings = &mut state.files.recordings;
             if recordings.examining.as_ref() != Some(&path) {
-                // Another one was chosen meanwhile.
+                // Another recording was chosen in the meantime.
                 return;
             }
             recordings.examining = None;
-            // What was sent is named as the person knows it, not by its folder on the server.
+            // A sent recording is shown under the user's name for it, not under its folder on the server.
             let sent = recordings.upload.as_ref().map(|upload| upload.path.clone());
             let name = recordings.sent_name.clone();
             let named = |text: &str| match &sent {
@@ -143,7 +145,7 @@ impl State {
         });
     }
 
-    /// Sends the recording that was chosen.
+    /// Sends the chosen recording.
     pub(super) fn recording_chosen(&mut self, chosen: Chosen) {
         self.remove_upload();
         self.files.is_open = true;
@@ -159,15 +161,15 @@ impl State {
                 if state.files.recordings.sending.is_some() {
                     state.outbox.add(Effect::SendRecording(id));
                 } else {
-                    // It was cancelled meanwhile.
+                    // The transfer was cancelled in the meantime.
                     state.remove_upload();
                 }
             }
-            Err(problem) => state.not_sent(problem),
+            Err(problem) => state.on_upload_refused(problem),
         });
     }
 
-    /// So many files are sent; the last one was the last to wait for.
+    /// Updates the number of files sent; after the last one, examines the recording.
     pub(super) fn files_sent(&mut self, sent: usize) {
         let recordings = &mut self.files.recordings;
         let Some(sending) = &mut recordings.sending else { return };
@@ -180,18 +182,18 @@ impl State {
         }
     }
 
-    /// A file was refused.
-    pub(super) fn not_sent(&mut self, problem: Problem) {
+    /// Handles a refused file.
+    pub(super) fn on_upload_refused(&mut self, problem: Problem) {
         let recordings = &mut self.files.recordings;
         (recordings.sending, recordings.problem) = (None, Some(problem));
         self.remove_upload();
     }
 
-    /// Removes what this page has sent and not imported.
+    /// Removes the upload of this page if it was not imported.
     fn remove_upload(&mut self) {
         let Some(upload) = self.files.recordings.upload.take() else { return };
         let call = Call::to::<RemoveUpload>(&AtUpload { upload: upload.id });
-        // The server may have removed it: an import takes it over.
+        // The server may have removed it already: an import takes it over.
         self.call_with_problem::<RemoveUpload>(call, |_, _| {});
     }
 
@@ -206,7 +208,7 @@ impl State {
             match outcome {
                 Ok(job) => {
                     state.files.recordings.import = Some(job);
-                    // It may have ended before the page knew its name.
+                    // The import may have ended before the page received its identifier.
                     state.follow_import();
                 }
                 Err(problem) => state.files.recordings.problem = Some(problem),
@@ -214,13 +216,13 @@ impl State {
         });
     }
 
-    /// Asks how far the import of this page is, whose events it may have missed.
+    /// Requests the state of this page's import, whose events it may have missed.
     pub(crate) fn follow_import(&mut self) {
         let Some(job) = &self.files.recordings.import else { return };
         let call = Call::to::<ShowImport>(&AtImport { import: job.id.clone() });
         self.call_with_problem::<ShowImport>(call, |state, outcome| match outcome {
-            Ok(job) => state.import_went_on(job),
-            // A server that was started anew does not have it; one that does not answer is asked again later.
+            Ok(job) => state.update_import(job),
+            // A restarted server does not have the import; if the server does not answer, ask again later.
             Err(problem) if problem.status == 404 => {
                 let detail = "The server was started again during the import; import the recording again.";
                 state.files.recordings.import = None;
@@ -233,15 +235,15 @@ impl State {
     fn cancel_import(&mut self) {
         let Some(job) = &self.files.recordings.import else { return };
         let call = Call::to::<CancelImport>(&AtImport { import: job.id.clone() });
-        self.call::<CancelImport>(call, Self::import_went_on);
+        self.call::<CancelImport>(call, Self::update_import);
     }
 
-    /// An import went on, perhaps that of this page.
-    pub(crate) fn import_went_on(&mut self, job: ImportJob) {
+    /// Updates the import of this page; other imports are ignored.
+    pub(crate) fn update_import(&mut self, job: ImportJob) {
         let recordings = &mut self.files.recordings;
         let Some(own) = recordings.import.as_mut().filter(|own| own.id == job.id) else { return };
         if !job.state.has_ended() {
-            // An answer may be older than an event.
+            // A reply may be older than an event.
             if job.k >= own.k {
                 *own = job;
             }
@@ -250,7 +252,7 @@ impl State {
         recordings.import = None;
         match (job.state, job.traverse) {
             (ImportState::Done, Some(traverse)) => {
-                // The server has taken over what was sent.
+                // The server has taken over the upload.
                 (recordings.shown, recordings.upload) = (None, None);
                 self.files.is_open = false;
                 job.notes.into_iter().for_each(|note| self.messages.note(note));
@@ -266,7 +268,7 @@ impl State {
         }
     }
 
-    /// Opens a drive that is new to this page.
+    /// Opens a drive that is not yet in the list of this page.
     fn open_imported(&mut self, id: String) {
         let call = Call::to::<ListTraverses>(&Anywhere {});
         self.call::<ListTraverses>(call, move |state, list| {

@@ -1,4 +1,4 @@
-//! Opening a recording of one's own: found, examined, imported with progress and Cancel, and refused with the fix.
+//! Opening a recording: listed, examined, imported with progress and cancellation, and refused with a remedy.
 
 use sightline_api::endpoints::{
     AddTraverse, BeginUpload, CancelImport, ListRecordings, ListSessions, ListTraverses, RemoveUpload,
@@ -13,9 +13,9 @@ use sightline_geometry::stereo_geometry::StereoGeometry;
 use sightline_world::library;
 
 use crate::command::Command;
-use crate::files::Ask as FilesAsk;
+use crate::files::FilesCommand;
 use crate::files::inbox::{Arrival, Chosen};
-use crate::files::recording::Ask;
+use crate::files::recording::RecordingCommand;
 use crate::files::window;
 use crate::net::events::Connection;
 use crate::state::State;
@@ -70,25 +70,25 @@ fn job(state: ImportState, k: usize) -> ImportJob {
     }
 }
 
-fn ask(state: &mut State, ask: Ask) {
-    state.perform(Command::Files(FilesAsk::Recording(ask)));
+fn perform(state: &mut State, command: RecordingCommand) {
+    state.perform(Command::Files(FilesCommand::Recording(command)));
 }
 
 /// The window with the list of recordings.
 fn opened() -> State {
     let mut state = fixture::at_step(&egui::Context::default(), 2);
     state.take_requests();
-    state.perform(Command::Files(FilesAsk::Open));
+    state.perform(Command::Files(FilesCommand::Open));
     answer::<ListRecordings>(&mut state, &list());
     answer::<ListSessions>(&mut state, &Vec::<u8>::new());
     state.take_requests();
     state
 }
 
-/// The window with what the first recording contains.
+/// The window with the contents of the first recording.
 fn examined() -> State {
     let mut state = opened();
-    ask(&mut state, Ask::Examine(contents().path));
+    perform(&mut state, RecordingCommand::Examine(contents().path));
     assert_eq!(
         calls_of::<ShowRecording>(&mut state)[0].path,
         "recordings/contents?path=%2Fdata%2Frecordings%2Fkitti%2F01"
@@ -100,13 +100,13 @@ fn examined() -> State {
 /// The window while the first recording is imported.
 fn importing() -> State {
     let mut state = examined();
-    ask(&mut state, Ask::Import);
-    ask(&mut state, Ask::Import);
+    perform(&mut state, RecordingCommand::Import);
+    perform(&mut state, RecordingCommand::Import);
     let imports = bodies::<StartImport>(&mut state);
     assert_eq!(imports, [NewImport { path: contents().path }], "once, however often it is pressed");
     answer::<StartImport>(&mut state, &job(ImportState::Waiting, 0));
     answer::<ShowImport>(&mut state, &job(ImportState::Running, 0));
-    state.told(Event::ImportProgress { job: job(ImportState::Running, 10) });
+    state.apply_event(Event::ImportProgress { job: job(ImportState::Running, 10) });
     state
 }
 
@@ -116,9 +116,12 @@ fn shown(state: fn() -> State) -> Shown<'static> {
 
 #[test]
 fn a_recording_is_opened_in_three_actions() {
-    // Ctrl+O was the first.
+    // Ctrl+O was the first action.
     let asked = shown(opened).click("recording kitti/01");
-    assert_eq!(asked, vec![Command::Files(FilesAsk::Recording(Ask::Examine(contents().path)))]);
+    assert_eq!(
+        asked,
+        vec![Command::Files(FilesCommand::Recording(RecordingCommand::Examine(contents().path)))]
+    );
     let mut card = shown(examined);
     for words in [
         "KITTI odometry",
@@ -132,16 +135,16 @@ fn a_recording_is_opened_in_three_actions() {
     }
     card.hides("recent session");
     let asked = card.click("Import the recording 01");
-    assert_eq!(asked, vec![Command::Files(FilesAsk::Recording(Ask::Import))]);
+    assert_eq!(asked, vec![Command::Files(FilesCommand::Recording(RecordingCommand::Import))]);
 
     let mut state = importing();
-    // The list that the window shows, as it was when it opened.
+    // The list as the window showed it when it opened.
     answer::<ListTraverses>(&mut state, &[fixture::entry()]);
-    state.told(Event::ImportProgress {
+    state.apply_event(Event::ImportProgress {
         job: ImportJob { id: "import-9".to_owned(), ..job(ImportState::Done, 40) },
     });
     assert!(state.files.is_open, "that is the import of another page");
-    state.told(Event::ImportProgress { job: job(ImportState::Done, 40) });
+    state.apply_event(Event::ImportProgress { job: job(ImportState::Done, 40) });
     assert!(!state.files.is_open);
     let entry = TraverseEntry { id: "01-abc".to_owned(), ..fixture::entry() };
     answer::<ListTraverses>(&mut state, &[fixture::entry(), entry]);
@@ -153,14 +156,14 @@ fn an_import_shows_its_progress_and_can_be_cancelled() {
     let mut card = shown(importing);
     card.says("10 of 40 images");
     let asked = card.click("Cancel the import");
-    assert_eq!(asked, vec![Command::Files(FilesAsk::Recording(Ask::Cancel))]);
+    assert_eq!(asked, vec![Command::Files(FilesCommand::Recording(RecordingCommand::Cancel))]);
     let mut state = importing();
     state.take_requests();
-    ask(&mut state, Ask::Cancel);
+    perform(&mut state, RecordingCommand::Cancel);
     assert_eq!(calls_of::<CancelImport>(&mut state)[0].path, "imports/import-1/cancel");
     answer::<CancelImport>(&mut state, &job(ImportState::Running, 5));
     assert_eq!(state.files.recordings.import.as_ref().unwrap().k, 10, "an older answer changes nothing");
-    state.told(Event::ImportProgress { job: job(ImportState::Cancelled, 11) });
+    state.apply_event(Event::ImportProgress { job: job(ImportState::Cancelled, 11) });
     assert_eq!((state.files.is_open, &state.files.recordings.import), (true, &None));
     assert!(state.messages.newest().unwrap().text.contains("cancelled"));
 }
@@ -188,7 +191,7 @@ fn an_import_is_followed_when_the_server_answers_again() {
 fn a_refused_recording_is_explained_where_it_was_chosen() {
     let refused = || {
         let mut state = opened();
-        ask(&mut state, Ask::Examine("/etc".to_owned()));
+        perform(&mut state, RecordingCommand::Examine("/etc".to_owned()));
         let mut problem =
             Problem::new(422, "path", "", "path: “/etc” is nothing below the folders of recordings.");
         problem.hint = Some("Start the server with `sightline serve --recordings FOLDER`.".to_owned());
@@ -202,12 +205,13 @@ fn a_refused_recording_is_explained_where_it_was_chosen() {
     let failed = || {
         let mut state = importing();
         let problem = Some("calib.txt needs a line P1.".to_owned());
-        state.told(Event::ImportProgress { job: ImportJob { problem, ..job(ImportState::Failed, 3) } });
+        state
+            .apply_event(Event::ImportProgress { job: ImportJob { problem, ..job(ImportState::Failed, 3) } });
         state
     };
     shown(failed).says("calib.txt needs a line P1.").says("Import the recording 01").says("Back");
     let mut state = failed();
-    ask(&mut state, Ask::Back);
+    perform(&mut state, RecordingCommand::Back);
     assert_eq!((&state.files.recordings.shown, &state.files.recordings.problem), (&None, &None));
 }
 
@@ -228,7 +232,7 @@ fn a_chosen_folder_is_sent_and_examined_and_what_is_not_imported_is_removed() {
         UploadView { id: "upload-1".to_owned(), path: "/up/upload-1".to_owned(), files: 0, bytes: 0 };
     let sending = move || {
         let mut state = opened();
-        ask(&mut state, Ask::Choose { is_archive: false });
+        perform(&mut state, RecordingCommand::Choose { is_archive: false });
         assert!(state.take_effects().contains(&Effect::ChooseRecording { is_archive: false }));
         state.file_arrived(Arrival::Chosen(chosen()));
         answer::<BeginUpload>(&mut state, &upload);
@@ -238,7 +242,10 @@ fn a_chosen_folder_is_sent_and_examined_and_what_is_not_imported_is_removed() {
     };
     let mut card = Shown::new([1000.0, 800.0], move |_| sending(), window::show);
     card.says("kitti: sent 1 of 3 files, 2.5 MB");
-    assert_eq!(card.click("Cancel sending"), vec![Command::Files(FilesAsk::Recording(Ask::StopSending))]);
+    assert_eq!(
+        card.click("Cancel sending"),
+        vec![Command::Files(FilesCommand::Recording(RecordingCommand::StopSending))]
+    );
     let upload =
         UploadView { id: "upload-1".to_owned(), path: "/up/upload-1".to_owned(), files: 0, bytes: 0 };
     let begun = || {
@@ -249,14 +256,14 @@ fn a_chosen_folder_is_sent_and_examined_and_what_is_not_imported_is_removed() {
         state
     };
     let mut state = begun();
-    ask(&mut state, Ask::StopSending);
+    perform(&mut state, RecordingCommand::StopSending);
     assert_eq!(calls_of::<RemoveUpload>(&mut state)[0].path, "uploads/upload-1");
 
     let mut state = begun();
     state.file_arrived(Arrival::Sent(3));
     assert_eq!(calls_of::<ShowRecording>(&mut state)[0].path, "recordings/contents?path=%2Fup%2Fupload-1");
     answer::<ShowRecording>(&mut state, &contents());
-    ask(&mut state, Ask::Back);
+    perform(&mut state, RecordingCommand::Back);
     assert_eq!(calls_of::<RemoveUpload>(&mut state).len(), 1);
 
     let mut state = begun();
@@ -273,7 +280,7 @@ fn a_chosen_folder_is_sent_and_examined_and_what_is_not_imported_is_removed() {
 #[test]
 fn a_scenario_of_the_program_is_opened_with_one_click() {
     let mut state = opened();
-    ask(&mut state, Ask::Scenario("occlusion"));
+    perform(&mut state, RecordingCommand::Scenario("occlusion"));
     assert_eq!(bodies::<AddTraverse>(&mut state)[0].scenario, library::toml("occlusion").unwrap());
     let entry = TraverseEntry { id: "occlusion-1".to_owned(), ..fixture::entry() };
     answer::<AddTraverse>(&mut state, &entry);

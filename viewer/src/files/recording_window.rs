@@ -1,4 +1,4 @@
-//! The part of the window Open for recordings and scenarios: lists, what a recording contains, and its import.
+//! The part of the window “Open” for recordings and scenarios: lists, the contents of a recording, and its import.
 
 use std::sync::LazyLock;
 
@@ -7,13 +7,13 @@ use sightline_api::recording::{ImportJob, ImportState, RecordingView};
 use sightline_geometry::stereo_geometry::StereoGeometry;
 use sightline_world::library;
 
-use crate::files::Ask as FilesAsk;
-use crate::files::recording::{Ask, Sending};
+use crate::files::FilesCommand;
+use crate::files::recording::{RecordingCommand, Sending};
 use crate::files::window::{Pressed, row};
 use crate::state::State;
 use crate::theme;
 
-/// The scenarios of the library with their descriptions, read once.
+/// The scenarios of the library with their descriptions.
 static SCENARIOS: LazyLock<Vec<(&str, String)>> = LazyLock::new(|| {
     let described = |name| {
         let description = library::scenario(name).map(|scenario| scenario.description);
@@ -22,12 +22,12 @@ static SCENARIOS: LazyLock<Vec<(&str, String)>> = LazyLock::new(|| {
     library::names().map(described).collect()
 });
 
-/// Largest height of the list of recordings, and height of one of its lines, points.
+/// Maximum height of the list of recordings, and height of its lines, points.
 const LIST_HEIGHT: f32 = 260.0;
 const LINE_HEIGHT: f32 = 30.0;
 
-/// Shows the recordings and a field for a path.
-pub(super) fn list(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(FilesAsk)) {
+/// Shows the recordings and an input field for a path.
+pub(super) fn list(ui: &mut Ui, state: &State, emit: &mut dyn FnMut(FilesCommand)) {
     let recordings = &state.files.recordings;
     ui.label(theme::title("your own recording: KITTI odometry, PDS3, or a Sightline drive"));
     match &recordings.list {
@@ -49,7 +49,7 @@ pub(super) fn list(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(FilesAsk)) {
                         let name = format!("recording {short}");
                         let pressed = row(ui, [short, &entry.format], false, &name, None);
                         if matches!(pressed, Some(Pressed::Row)) {
-                            ask(FilesAsk::Recording(Ask::Examine(entry.path.clone())));
+                            emit(FilesCommand::Recording(RecordingCommand::Examine(entry.path.clone())));
                         }
                     }
                 },
@@ -60,11 +60,11 @@ pub(super) fn list(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(FilesAsk)) {
             if !list.is_complete {
                 ui.label(theme::note("There are more; enter the path of another one."));
             }
-            path(ui, state, ask);
+            path(ui, state, emit);
         }
     }
     if cfg!(any(test, target_arch = "wasm32")) {
-        send(ui, state, ask);
+        send(ui, state, emit);
     }
     if let Some(path) = &recordings.examining {
         ui.horizontal(|ui| {
@@ -75,13 +75,13 @@ pub(super) fn list(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(FilesAsk)) {
     problem(ui, state);
 }
 
-/// The path without the folder that was named at start.
+/// The path relative to the folder given at the server's start.
 fn short<'a>(path: &'a str, folders: &[String]) -> &'a str {
     let below = folders.iter().find_map(|folder| path.strip_prefix(folder.as_str()));
     below.map(|below| below.trim_start_matches('/')).filter(|below| !below.is_empty()).unwrap_or(path)
 }
 
-fn path(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(FilesAsk)) {
+fn path(ui: &mut Ui, state: &State, emit: &mut dyn FnMut(FilesCommand)) {
     ui.horizontal(|ui| {
         let mut text = state.files.recordings.path.clone();
         let hint = "path of a folder on the server's machine";
@@ -91,16 +91,16 @@ fn path(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(FilesAsk)) {
         let can_examine = !text.trim().is_empty();
         let button = ui.add_enabled(can_examine, Button::new("Examine").min_size(vec2(24.0, 24.0)));
         if text != state.files.recordings.path {
-            ask(FilesAsk::Recording(Ask::Type(text.clone())));
+            emit(FilesCommand::Recording(RecordingCommand::Type(text.clone())));
         }
         if (is_entered || button.clicked()) && can_examine {
-            ask(FilesAsk::Recording(Ask::Examine(text.trim().to_owned())));
+            emit(FilesCommand::Recording(RecordingCommand::Examine(text.trim().to_owned())));
         }
     });
 }
 
-/// Buttons that choose a recording on the person's own machine, and the progress of sending it.
-fn send(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(FilesAsk)) {
+/// Buttons that choose a recording on the user's machine, and the progress of sending it.
+fn send(ui: &mut Ui, state: &State, emit: &mut dyn FnMut(FilesCommand)) {
     ui.horizontal(|ui| {
         if let Some(Sending { chosen, sent }) = &state.files.recordings.sending {
             let megabytes = chosen.bytes as f64 / 1e6;
@@ -110,14 +110,14 @@ fn send(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(FilesAsk)) {
             ui.add(ProgressBar::new(share).desired_width(440.0).text(words));
             let cancel = Button::new("Cancel").min_size(vec2(24.0, 24.0));
             if ui.add(cancel).accessible_name("Cancel sending").clicked() {
-                ask(FilesAsk::Recording(Ask::StopSending));
+                emit(FilesCommand::Recording(RecordingCommand::StopSending));
             }
             return;
         }
         ui.label(theme::label("on this machine:"));
         for (label, is_archive) in [("Choose a folder …", false), ("Choose a zip archive …", true)] {
             if ui.add(Button::new(label).min_size(vec2(24.0, 24.0))).clicked() {
-                ask(FilesAsk::Recording(Ask::Choose { is_archive }));
+                emit(FilesCommand::Recording(RecordingCommand::Choose { is_archive }));
             }
         }
     });
@@ -132,8 +132,8 @@ fn problem(ui: &mut Ui, state: &State) {
     }
 }
 
-/// Shows what a recording contains, or the progress of its import, instead of the lists; whether there is one.
-pub(super) fn card(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(FilesAsk)) -> bool {
+/// Shows the contents of a recording, or the progress of its import, instead of the lists. Returns whether there is one.
+pub(super) fn card(ui: &mut Ui, state: &State, emit: &mut dyn FnMut(FilesCommand)) -> bool {
     let recordings = &state.files.recordings;
     let Some(view) = &recordings.shown else { return false };
     ui.label(RichText::new(&view.name).size(15.0).strong().color(theme::strong()));
@@ -141,7 +141,7 @@ pub(super) fn card(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(FilesAsk)) ->
     problem(ui, state);
     ui.add_space(6.0);
     if let Some(job) = &recordings.import {
-        progress(ui, job, ask);
+        progress(ui, job, emit);
         return true;
     }
     ui.horizontal(|ui| {
@@ -149,10 +149,10 @@ pub(super) fn card(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(FilesAsk)) ->
         let button = Button::new(label).min_size(vec2(80.0, 26.0));
         let button = ui.add_enabled(!recordings.is_starting, button);
         if button.accessible_name(format!("{label} the recording {}", view.name)).clicked() {
-            ask(FilesAsk::Recording(Ask::Import));
+            emit(FilesCommand::Recording(RecordingCommand::Import));
         }
         if ui.add(Button::new("Back").min_size(vec2(24.0, 26.0))).clicked() {
-            ask(FilesAsk::Recording(Ask::Back));
+            emit(FilesCommand::Recording(RecordingCommand::Back));
         }
         if !view.is_opened_in_place {
             ui.label(theme::note(format!(
@@ -215,7 +215,7 @@ fn contents(ui: &mut Ui, view: &RecordingView, folder: &str) {
     }
 }
 
-fn progress(ui: &mut Ui, job: &ImportJob, ask: &mut dyn FnMut(FilesAsk)) {
+fn progress(ui: &mut Ui, job: &ImportJob, emit: &mut dyn FnMut(FilesCommand)) {
     ui.horizontal(|ui| {
         let words = match job.state {
             ImportState::Waiting => "waiting for another import".to_owned(),
@@ -228,25 +228,25 @@ fn progress(ui: &mut Ui, job: &ImportJob, ask: &mut dyn FnMut(FilesAsk)) {
             .accessible_name("Cancel the import")
             .clicked()
         {
-            ask(FilesAsk::Recording(Ask::Cancel));
+            emit(FilesCommand::Recording(RecordingCommand::Cancel));
         }
     });
 }
 
-/// Shows the scenarios that come with the program.
-pub(super) fn scenarios(ui: &mut Ui, ask: &mut dyn FnMut(FilesAsk)) {
+/// Shows the scenarios of the library.
+pub(super) fn scenarios(ui: &mut Ui, emit: &mut dyn FnMut(FilesCommand)) {
     let title = theme::title("a scenario that comes with Sightline");
     CollapsingHeader::new(title).id_salt("scenarios").show(ui, |ui| {
         for (name, description) in SCENARIOS.iter() {
             let pressed = row(ui, [name, description], false, &format!("scenario {name}"), None);
             if matches!(pressed, Some(Pressed::Row)) {
-                ask(FilesAsk::Recording(Ask::Scenario(name)));
+                emit(FilesCommand::Recording(RecordingCommand::Scenario(name)));
             }
         }
     });
 }
 
-/// A description without the parentheses that only refer to requirements, such as “ (R104, R106)”.
+/// A description without parentheses that only cite requirements, such as “ (R104, R106)”.
 fn without_references(description: &str) -> String {
     let mut text = String::new();
     let mut rest = description;
@@ -262,7 +262,7 @@ fn without_references(description: &str) -> String {
     [", R", " of R"].iter().fold(text + rest, |text, mark| without_numbers(&text, mark))
 }
 
-/// The text without this mark where a number follows it, and without the number.
+/// Removes `mark` and the number after it, wherever a number follows it.
 fn without_numbers(text: &str, mark: &str) -> String {
     let mut parts = text.split(mark);
     let mut whole = parts.next().unwrap_or_default().to_owned();

@@ -1,4 +1,4 @@
-//! Removes sessions and drives where they are listed, and follows removals by other pages.
+//! Removes sessions and drives from the lists, and follows removals by other pages.
 
 use sightline_api::endpoint::Call;
 use sightline_api::endpoints::{RemoveSession, RemoveTraverse, RestoreSession};
@@ -8,7 +8,7 @@ use sightline_api::wire::SessionEntry;
 use crate::state::State;
 
 impl State {
-    /// Removes a session; it stays in the list with a way to restore it.
+    /// Removes a session; it remains listed as removed and can be restored.
     pub(super) fn remove_session(&mut self, entry: SessionEntry) {
         let call = Call::to::<RemoveSession>(&AtSession { session: entry.id.clone() });
         self.call::<RemoveSession>(call, move |state, _| {
@@ -21,7 +21,7 @@ impl State {
         });
     }
 
-    /// Takes the removal of a session back.
+    /// Restores a removed session.
     pub(super) fn restore_session(&mut self, id: String) {
         let call = Call::to::<RestoreSession>(&AtSession { session: id.clone() });
         self.call::<RestoreSession>(call, move |state, _| {
@@ -41,7 +41,7 @@ impl State {
         });
     }
 
-    /// A page removed a session, perhaps this one.
+    /// Handles the removal of a session by any page; it may be the open session.
     pub(crate) fn session_removed(&mut self, id: &str) {
         if let Some(recent) = &mut self.files.recent {
             recent.retain(|entry| entry.id != id);
@@ -54,7 +54,7 @@ impl State {
         }
     }
 
-    /// A page removed a drive.
+    /// Handles the removal of a drive by any page.
     pub(crate) fn drive_removed(&mut self, id: &str) {
         self.files.removed.retain(|removed| removed.traverse != id);
         if let Some(list) = &mut self.traverses {

@@ -1,4 +1,4 @@
-//! Opening: what a file is, what is said of one that is none, and what comes of it.
+//! Opening files: recognition, refusals, and effects.
 
 use serde_json::{Value, json};
 use sightline_api::endpoint::Call;
@@ -15,7 +15,7 @@ use sightline_world::Scenario;
 
 use crate::command::Command;
 use crate::command::keys;
-use crate::files::Ask;
+use crate::files::FilesCommand;
 use crate::files::documents::{Document, TEXT_LIMIT, before_reading, only_one, read, shown};
 use crate::files::inbox::Arrival;
 use crate::files::window;
@@ -38,7 +38,7 @@ fn reproduce() -> Value {
     })
 }
 
-/// What is said of a file, which must be one sentence that names it.
+/// The refusal of a file, which must be one sentence that names it.
 fn refused(name: &str, bytes: &[u8]) -> String {
     let said = before_reading(name, bytes.len() as u64, false).and_then(|()| read(name, bytes).map(|_| ()));
     let said = said.expect_err("a refusal");
@@ -68,7 +68,7 @@ fn every_kind_of_file_that_can_be_opened_is_recognised_by_its_contents() {
 }
 
 #[test]
-fn whatever_else_is_dropped_gets_one_sentence_that_names_the_file_and_the_fix() {
+fn an_unsupported_file_is_refused_with_its_name_and_a_fix() {
     let json = |value: Value| value.to_string().into_bytes();
     for (name, bytes, fix) in [
         ("log.rrd", b"RRF2".to_vec(), "rerun FILE"),
@@ -181,7 +181,7 @@ fn a_configuration_becomes_the_draft_that_takes_the_run_to_it_and_can_be_taken_b
     drop_file(&mut state, "a.toml", b"ncc_min = 0.6\n");
     assert_eq!(serde_json::to_value(&state.draft).unwrap(), json!({ "ncc_min": 0.6 }));
     assert!(state.take_effects().contains(&Effect::reveal(Pane::Settings)));
-    state.perform(Command::Why(crate::why::Ask::Undo));
+    state.perform(Command::Why(crate::why::WhyCommand::Undo));
     assert!(state.draft.is_empty());
     drop_file(&mut state, "a.toml", b"ncc_min = 0.7\n");
     assert!(newest(&state).1.contains("of this very run"), "{}", newest(&state).1);
@@ -233,13 +233,13 @@ fn recent_sessions_are_listed_by_their_use_and_one_click_opens_one() {
     let mut shown = Shown::new([1000.0, 800.0], window, window::show);
     shown.says("scenario (.toml)").says("new session on Six stops");
     let name = "session s3 on Six stops: 1 target, 3 runs, at step 4 of 5, used 2 hours ago";
-    assert_eq!(shown.click(name), vec![Command::Files(Ask::Resume("s3".to_owned()))]);
+    assert_eq!(shown.click(name), vec![Command::Files(FilesCommand::Resume("s3".to_owned()))]);
     let mut state = window(&egui::Context::default());
-    state.perform(Command::Files(Ask::Resume("s3".to_owned())));
+    state.perform(Command::Files(FilesCommand::Resume("s3".to_owned())));
     let read = Call::to::<ShowSession>(&AtSession { session: "s3".to_owned() });
     assert_eq!((calls(&mut state), state.files.is_open), (vec![read], false));
-    state.perform(Command::Files(Ask::Open));
-    state.perform(Command::Files(Ask::Resume("s1".to_owned())));
+    state.perform(Command::Files(FilesCommand::Open));
+    state.perform(Command::Files(FilesCommand::Resume("s1".to_owned())));
     assert_eq!(newest(&state).1, "That session is open already.");
 }
 
@@ -252,9 +252,12 @@ fn a_listed_session_is_removed_and_restored_with_one_click_each() {
         state
     };
     let mut shown = Shown::new([1000.0, 800.0], window, window::show);
-    let removed = Command::Files(Ask::RemoveSession(Box::new(entry("s3", None))));
+    let removed = Command::Files(FilesCommand::RemoveSession(Box::new(entry("s3", None))));
     assert_eq!(shown.click("remove session s3"), vec![removed.clone()]);
-    assert_eq!(shown.click("restore session s2"), vec![Command::Files(Ask::RestoreSession("s2".to_owned()))]);
+    assert_eq!(
+        shown.click("restore session s2"),
+        vec![Command::Files(FilesCommand::RestoreSession("s2".to_owned()))]
+    );
 
     let mut state = window(&egui::Context::default());
     state.take_requests();
@@ -263,7 +266,7 @@ fn a_listed_session_is_removed_and_restored_with_one_click_each() {
     assert_eq!(calls_of::<RemoveSession>(&mut state), [expected]);
     answer::<RemoveSession>(&mut state, &());
     assert_eq!(state.files.removed.last().unwrap().id, "s3");
-    state.told(Event::SessionRemoved { session: "s1".to_owned() });
+    state.apply_event(Event::SessionRemoved { session: "s1".to_owned() });
     assert!(newest(&state).1.contains("s1 was removed"), "the open one, by another page");
 }
 
@@ -276,7 +279,7 @@ fn a_drive_is_removed_after_a_question() {
         state.traverses = Some(vec![fixture::entry(), TraverseEntry { removable: true, ..hill }]);
         state
     };
-    let asked = Command::Files(Ask::ConfirmDrive(Some("hill-1".to_owned())));
+    let asked = Command::Files(FilesCommand::ConfirmDrive(Some("hill-1".to_owned())));
     let mut shown = Shown::new([1000.0, 800.0], window, window::show);
     assert_eq!(shown.click("remove the drive hill"), vec![asked.clone()]);
     let confirming = move |context: &egui::Context| {
@@ -285,10 +288,10 @@ fn a_drive_is_removed_after_a_question() {
         state
     };
     let mut shown = Shown::new([1000.0, 800.0], confirming, window::show);
-    let really = Command::Files(Ask::RemoveDrive("hill-1".to_owned()));
+    let really = Command::Files(FilesCommand::RemoveDrive("hill-1".to_owned()));
     assert_eq!(shown.click("really remove the drive hill"), vec![really]);
     let mut state = window(&egui::Context::default());
-    state.told(Event::TraverseRemoved { traverse: "hill-1".to_owned() });
+    state.apply_event(Event::TraverseRemoved { traverse: "hill-1".to_owned() });
     assert_eq!(state.traverses.unwrap().len(), 1);
 }
 

@@ -1,4 +1,4 @@
-//! Carries out what a person asks of files and sessions, and opens the files that arrive.
+//! Carries out user requests concerning files and sessions, and opens the files that arrive.
 
 use sightline_api::endpoint::{Call, Endpoint};
 use sightline_api::endpoints::{AddTraverse, BringSession, ListSessions};
@@ -10,28 +10,28 @@ use sightline_track::settings::{Changes, Settings};
 use crate::cache::Key;
 use crate::files::documents::Document;
 use crate::files::inbox::Arrival;
-use crate::files::{Ask, documents};
+use crate::files::{FilesCommand, documents};
 use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::state::effect::Effect;
 
 impl State {
-    /// Carries out what was asked.
-    pub(crate) fn ask_of_files(&mut self, ask: Ask) {
-        match ask {
-            Ask::Open => {
+    /// Carries out a request.
+    pub(crate) fn apply_files_command(&mut self, command: FilesCommand) {
+        match command {
+            FilesCommand::Open => {
                 self.files.is_open = true;
                 (self.files.refused, self.files.recordings.problem) = (None, None);
                 self.read_recent();
-                // A drive on commands has more stops than when the list was read.
+                // A commanded drive may have more stops than when the list was read.
                 self.read_traverses();
                 self.read_recordings();
             }
-            Ask::Close => self.files.is_open = false,
-            Ask::Choose => self.outbox.add(Effect::ChooseFile),
-            Ask::Type(path) => self.files.path = path,
-            Ask::Path(path) => self.outbox.add(Effect::ReadFile(path)),
-            Ask::Resume(id) => {
+            FilesCommand::Close => self.files.is_open = false,
+            FilesCommand::Choose => self.outbox.add(Effect::ChooseFile),
+            FilesCommand::Type(path) => self.files.path = path,
+            FilesCommand::Path(path) => self.outbox.add(Effect::ReadFile(path)),
+            FilesCommand::Resume(id) => {
                 self.files.is_open = false;
                 if self.session.as_ref().is_some_and(|open| open.id == id) {
                     self.messages.note("That session is open already.");
@@ -40,23 +40,23 @@ impl State {
                     self.read_session(id);
                 }
             }
-            Ask::TryAgain => {
+            FilesCommand::TryAgain => {
                 let here = self.cursor.step;
                 self.cache.retry(|key| matches!(key, Key::Image { step, .. } if *step == here));
             }
-            Ask::Recording(ask) => self.ask_of_recordings(ask),
-            Ask::RemoveSession(entry) => self.remove_session(*entry),
-            Ask::RestoreSession(id) => self.restore_session(id),
-            Ask::ConfirmDrive(id) => self.files.confirming = id,
-            Ask::RemoveDrive(id) => self.remove_drive(id),
-            Ask::Begin(traverse) => {
+            FilesCommand::Recording(command) => self.apply_recording_command(command),
+            FilesCommand::RemoveSession(entry) => self.remove_session(*entry),
+            FilesCommand::RestoreSession(id) => self.restore_session(id),
+            FilesCommand::ConfirmDrive(id) => self.files.confirming = id,
+            FilesCommand::RemoveDrive(id) => self.remove_drive(id),
+            FilesCommand::Begin(traverse) => {
                 self.files.is_open = false;
                 self.begin_session(traverse);
             }
         }
     }
 
-    /// Takes in what came of a file.
+    /// Handles the outcome of opening a file.
     pub fn file_arrived(&mut self, arrival: Arrival) {
         match arrival {
             Arrival::Refused(why) => self.messages.refused_file(why),
@@ -66,7 +66,7 @@ impl State {
             },
             Arrival::Chosen(chosen) => self.recording_chosen(chosen),
             Arrival::Sent(count) => self.files_sent(count),
-            Arrival::NotSent(problem) => self.not_sent(problem),
+            Arrival::NotSent(problem) => self.on_upload_refused(problem),
         }
     }
 
@@ -109,7 +109,7 @@ impl State {
         });
     }
 
-    /// Begins a session as it was elsewhere.
+    /// Begins a session from an export.
     fn bring_session(&mut self, file: String, reproduction: &Reproduction) {
         let call = Call::with_body::<BringSession>(&Anywhere {}, reproduction);
         self.open_file::<BringSession>(file, call, |state, file, view| {
@@ -120,7 +120,7 @@ impl State {
         });
     }
 
-    /// Has the server open a file; `take` gets the file's name and the reply, and a refusal names the file.
+    /// Lets the server open a file; `take` receives the file's name and the reply, and a refusal names the file.
     fn open_file<E: Endpoint>(
         &mut self,
         file: String,
@@ -144,12 +144,12 @@ impl State {
         });
     }
 
-    /// Asks for the sessions, for the list of recent ones.
+    /// Requests the list of recent sessions.
     pub(super) fn read_recent(&mut self) {
         let call = Call::to::<ListSessions>(&Anywhere {});
         self.call_with_problem::<ListSessions>(call, |state, outcome| match outcome {
             Ok(mut list) => {
-                // Those of which nobody knows when they were used come last, the newest of them first.
+                // Sessions without a known time of use are last, the newest of them first.
                 list.reverse();
                 let idle_s = |entry: &SessionEntry| entry.idle_s.unwrap_or(f64::INFINITY);
                 list.sort_by(|a, b| idle_s(a).total_cmp(&idle_s(b)));
@@ -159,7 +159,7 @@ impl State {
         });
     }
 
-    /// Puts a configuration into the draft: what takes the run that is looked at to it.
+    /// Drafts the changes that lead from the selected run to a configuration.
     fn open_settings(&mut self, file: &str, changes: &Changes) {
         let wanted = Settings::default().with(changes).ok();
         let Some(draft) = wanted.and_then(|wanted| self.changes_to_settings(&wanted)) else {
@@ -195,7 +195,7 @@ impl State {
         self.outbox.add(Effect::reveal(Pane::Breakpoints));
         let count = list.len();
         for (expression, is_on) in list {
-            self.set_again(&expression, is_on);
+            self.restore_breakpoint(&expression, is_on);
         }
         let what = if count == 1 { "One breakpoint".to_owned() } else { format!("{count} breakpoints") };
         self.messages.note(format!("{what} of {file} set."));

@@ -1,4 +1,5 @@
-//! The window in which a file, a recent session or a drive is opened, and the veil while a file is dragged over the page.
+//! The window in which a file, a recent session or a drive is opened, and the overlay while a file is dragged over the
+//! page.
 
 use egui::{
     Align2, Area, Button, Id, Label, Modal, Order, RichText, ScrollArea, Sense, Ui, WidgetInfo, vec2,
@@ -6,19 +7,19 @@ use egui::{
 use sightline_api::wire::{SessionEntry, TraverseEntry};
 
 use crate::command::Command;
-use crate::files::Ask;
+use crate::files::FilesCommand;
 use crate::files::documents::OPENABLE;
 use crate::files::recording_window;
 use crate::state::State;
 use crate::theme;
 
-/// How many recent sessions are listed.
+/// Maximum number of listed sessions.
 const LISTED: usize = 30;
 
-/// The window's height at most, points. It does not depend on what has come in: lines must not move under the pointer.
+/// Maximum height of the window, points. It does not depend on the contents, so that lines do not move under the pointer.
 const MAX_HEIGHT: f32 = 640.0;
 
-/// The room for the small button beside a line.
+/// Width of the small button beside a line, points.
 const BESIDE_WIDTH: f32 = 84.0;
 
 /// Shows the window, while it is open.
@@ -26,42 +27,42 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     if !state.files.is_open {
         return;
     }
-    let mut ask = |ask: Ask| out.push(Command::Files(ask));
+    let mut emit = |command: FilesCommand| out.push(Command::Files(command));
     let modal = Modal::new(Id::unique("open")).backdrop_color(theme::shade()).show(ui.ctx(), |ui| {
         ui.set_width(600.0);
         let height = (ui.ctx().content_rect().height() - 150.0).clamp(200.0, MAX_HEIGHT);
         ui.label(RichText::new("Open").size(16.0).strong().color(theme::strong()));
         let list = ScrollArea::vertical().max_height(height).min_scrolled_height(height).auto_shrink(false);
         list.show(ui, |ui| {
-            if recording_window::card(ui, state, &mut ask) {
+            if recording_window::card(ui, state, &mut emit) {
                 return;
             }
-            recording_window::list(ui, state, &mut ask);
+            recording_window::list(ui, state, &mut emit);
             ui.add_space(8.0);
-            recent(ui, state, &mut ask);
+            recent(ui, state, &mut emit);
             ui.add_space(8.0);
-            drives(ui, state, &mut ask);
+            drives(ui, state, &mut emit);
             ui.add_space(8.0);
-            recording_window::scenarios(ui, &mut ask);
+            recording_window::scenarios(ui, &mut emit);
             ui.add_space(8.0);
-            file(ui, state, &mut ask);
+            file(ui, state, &mut emit);
         });
         ui.separator();
         ui.add(Button::new("Close").min_size(vec2(24.0, 24.0))).clicked()
     });
     if modal.inner || modal.should_close() {
-        ask(Ask::Close);
+        emit(FilesCommand::Close);
     }
 }
 
-fn file(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(Ask)) {
+fn file(ui: &mut Ui, state: &State, emit: &mut dyn FnMut(FilesCommand)) {
     ui.label(theme::title("a file: drop it anywhere on the page, or"));
     if cfg!(target_arch = "wasm32") {
         if ui.add(Button::new("Choose a file …").min_size(vec2(24.0, 24.0))).clicked() {
-            ask(Ask::Choose);
+            emit(FilesCommand::Choose);
         }
     } else {
-        path(ui, state, ask);
+        path(ui, state, emit);
     }
     for (what, comes_of_it) in OPENABLE {
         ui.horizontal_wrapped(|ui| {
@@ -78,8 +79,8 @@ fn file(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(Ask)) {
     }
 }
 
-/// A program of its own has no dialog of the browser; the path does the same.
-fn path(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(Ask)) {
+/// The native program has no browser dialog and takes a path instead.
+fn path(ui: &mut Ui, state: &State, emit: &mut dyn FnMut(FilesCommand)) {
     ui.horizontal(|ui| {
         let mut text = state.files.path.clone();
         let field = egui::TextEdit::singleline(&mut text).desired_width(420.0).hint_text("path of a file");
@@ -88,15 +89,15 @@ fn path(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(Ask)) {
         let can_open = !text.trim().is_empty();
         let button = ui.add_enabled(can_open, Button::new("Open this file").min_size(vec2(24.0, 24.0)));
         if text != state.files.path {
-            ask(Ask::Type(text.clone()));
+            emit(FilesCommand::Type(text.clone()));
         }
         if (is_entered || button.clicked()) && can_open {
-            ask(Ask::Path(text.trim().to_owned()));
+            emit(FilesCommand::Path(text.trim().to_owned()));
         }
     });
 }
 
-fn recent(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(Ask)) {
+fn recent(ui: &mut Ui, state: &State, emit: &mut dyn FnMut(FilesCommand)) {
     ui.label(theme::title("a recent session"));
     let list = match (&state.files.recent, &state.files.refused) {
         (_, Some(why)) => {
@@ -120,8 +121,8 @@ fn recent(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(Ask)) {
         let name = format!("remove session {}", entry.id);
         let remove = (!is_open).then_some(("Remove", name.as_str()));
         match row(ui, [&entry.traverse_name, &words], is_open, &session_name(entry), remove) {
-            Some(Pressed::Row) => ask(Ask::Resume(entry.id.clone())),
-            Some(Pressed::Beside) => ask(Ask::RemoveSession(Box::new(entry.clone()))),
+            Some(Pressed::Row) => emit(FilesCommand::Resume(entry.id.clone())),
+            Some(Pressed::Beside) => emit(FilesCommand::RemoveSession(Box::new(entry.clone()))),
             None => {}
         }
     }
@@ -130,7 +131,7 @@ fn recent(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(Ask)) {
             ui.label(theme::note(format!("{} on {} was removed.", entry.id, entry.traverse_name)));
             let undo = Button::new("Undo").min_size(vec2(24.0, 24.0));
             if ui.add(undo).accessible_name(format!("restore session {}", entry.id)).clicked() {
-                ask(Ask::RestoreSession(entry.id.clone()));
+                emit(FilesCommand::RestoreSession(entry.id.clone()));
             }
         });
     }
@@ -139,7 +140,7 @@ fn recent(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(Ask)) {
     }
 }
 
-fn drives(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(Ask)) {
+fn drives(ui: &mut Ui, state: &State, emit: &mut dyn FnMut(FilesCommand)) {
     ui.label(theme::title("a new session on a drive of this server"));
     let list = state.traverses.as_deref().unwrap_or_default();
     if list.is_empty() {
@@ -151,27 +152,27 @@ fn drives(ui: &mut Ui, state: &State, ask: &mut dyn FnMut(Ask)) {
         let name = format!("remove the drive {}", entry.name);
         let remove = entry.removable.then_some(("Remove …", name.as_str()));
         match row(ui, [&entry.name, &words], false, &format!("new session on {}", entry.name), remove) {
-            Some(Pressed::Row) => ask(Ask::Begin(entry.id.clone())),
-            Some(Pressed::Beside) => ask(Ask::ConfirmDrive(Some(entry.id.clone()))),
+            Some(Pressed::Row) => emit(FilesCommand::Begin(entry.id.clone())),
+            Some(Pressed::Beside) => emit(FilesCommand::ConfirmDrive(Some(entry.id.clone()))),
             None => {}
         }
         if state.files.confirming.as_ref() == Some(&entry.id) {
-            confirm(ui, entry, ask);
+            confirm(ui, entry, emit);
         }
     }
 }
 
-/// Asks whether to remove a drive, because its images are rendered anew when it is opened again.
-fn confirm(ui: &mut Ui, entry: &TraverseEntry, ask: &mut dyn FnMut(Ask)) {
+/// Asks the user to confirm the removal of a drive, because its images must be rendered again when it is reopened.
+fn confirm(ui: &mut Ui, entry: &TraverseEntry, emit: &mut dyn FnMut(FilesCommand)) {
     ui.horizontal(|ui| {
         let words = format!("Remove {} and its rendered images? Its scenario opens it again.", entry.name);
         ui.label(RichText::new(words).color(theme::text()));
         let remove = Button::new("Remove").min_size(vec2(24.0, 24.0));
         if ui.add(remove).accessible_name(format!("really remove the drive {}", entry.name)).clicked() {
-            ask(Ask::RemoveDrive(entry.id.clone()));
+            emit(FilesCommand::RemoveDrive(entry.id.clone()));
         }
         if ui.add(Button::new("Keep").min_size(vec2(24.0, 24.0))).clicked() {
-            ask(Ask::ConfirmDrive(None));
+            emit(FilesCommand::ConfirmDrive(None));
         }
     });
 }
@@ -184,7 +185,7 @@ pub(super) enum Pressed {
     Beside,
 }
 
-/// A line that is one button (title, and more about it), perhaps with a small one beside it (label and accessible name).
+/// A line that is one button (title and details), optionally with a small one beside it (label and accessible name).
 pub(super) fn row(
     ui: &mut Ui,
     [title, words]: [&str; 2],
@@ -220,12 +221,12 @@ pub(super) fn row(
     .inner
 }
 
-/// The accessible name of a recent session: what the line says.
+/// The accessible name of a recent session, with the contents of its line.
 fn session_name(entry: &SessionEntry) -> String {
     format!("session {} on {}: {}", entry.id, entry.traverse_name, about(entry, false))
 }
 
-/// Targets, runs, how far and when.
+/// Targets, runs, step and time of the last use.
 fn about(entry: &SessionEntry, is_open: bool) -> String {
     let count = |n: usize, one: &str| if n == 1 { format!("1 {one}") } else { format!("{n} {one}s") };
     let when = if is_open { "open now".to_owned() } else { ago(entry.idle_s) };
@@ -233,7 +234,7 @@ fn about(entry: &SessionEntry, is_open: bool) -> String {
     format!("{targets}, {runs}, at step {} of {}, {when}", entry.step, entry.stop_count.saturating_sub(1))
 }
 
-/// How long ago, as a person says it.
+/// The time since the last use, in words.
 pub(crate) fn ago(idle_s: Option<f64>) -> String {
     let Some(s) = idle_s else { return "used before this was noted".to_owned() };
     let (count, unit) = match s {
@@ -246,7 +247,7 @@ pub(crate) fn ago(idle_s: Option<f64>) -> String {
     format!("used {count} {unit}{} ago", if count == 1.0 { "" } else { "s" })
 }
 
-/// Shows over the whole page what can be dropped, while something is dragged over it.
+/// Covers the page with the list of accepted files while a file is dragged over it.
 pub(crate) fn veil(ui: &mut Ui, state: &State) {
     if !state.files.is_hovered {
         return;

@@ -1,19 +1,19 @@
-//! What can be asked of the arrangement of the panels.
+//! Commands that change the arrangement of the panels.
 
 use crate::layout::presets::Preset;
 use crate::panels::pane::Pane;
 
-/// What can be asked of the arrangement.
+/// A command that changes the arrangement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LayoutCommand {
-    /// Arranges the panels as they came with the page.
+    /// Restores a predefined arrangement.
     Use(Preset),
-    /// Brings a panel to the front; one that was closed comes back.
+    /// Brings a panel to the front; reopens a closed one.
     Show(Pane),
     /// Closes a panel.
     Close(Pane),
-    /// Moves the keyboard by so many panels.
+    /// Moves the keyboard focus by a number of panels.
     Panel(isize),
-    /// Lets the panel with the keyboard fill the page, or gives the others their place back.
+    /// Maximises a panel (`None`: the current one), or restores the others if one is maximised.
     Maximise(Option<Pane>),
 }

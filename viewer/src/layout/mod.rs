@@ -1,11 +1,11 @@
-//! Where the panels are: a tree of tiles that a person can drag, resize, close and bring back.
+//! The arrangement of the panels: a tree of tiles that the user can drag, resize, close and reopen.
 //!
 //! | file | what it does |
 //! |---|---|
-//! | `command` | what can be asked of the arrangement |
-//! | `left_image` | where the left image is on the screen |
-//! | `presets` | the eight arrangements that come with the page, and the one for narrow windows |
-//! | `workspace` | the arrangement in use: presets, the panel with the keyboard, the one that fills the page; kept across reloads |
+//! | `command` | the commands that change the arrangement |
+//! | `left_image` | the position of the left image on the screen |
+//! | `presets` | the eight predefined arrangements, and the one for narrow windows |
+//! | `workspace` | the current arrangement, focused panel and maximised panel; stored across reloads |
 
 pub(crate) mod command;
 pub(crate) mod left_image;
@@ -23,9 +23,9 @@ use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::theme;
 
-/// Shows one panel: itself, its values as tables, or why there is nothing to show.
+/// Shows one panel: its contents, its values as tables, or why it is empty.
 ///
-/// Returns where the left image is, if the panel showed it.
+/// Returns the position of the left image, if the panel showed it.
 pub(crate) fn show_pane(ui: &mut Ui, pane: Pane, state: &State, out: &mut Vec<Command>) -> LeftImage {
     let panel = pane.panel();
     if state.is_table(pane) {
@@ -38,32 +38,32 @@ pub(crate) fn show_pane(ui: &mut Ui, pane: Pane, state: &State, out: &mut Vec<Co
     take_left_image(ui)
 }
 
-/// Shows the panels and gathers their commands.
+/// Shows the panels and collects their commands.
 pub(crate) struct Panels<'a> {
-    /// What they show.
+    /// The state shown.
     pub state: &'a State,
-    /// What they ask for.
+    /// The commands of the panels.
     pub out: &'a mut Vec<Command>,
-    /// Where the left image is.
+    /// The position of the left image.
     pub left_image: LeftImage,
-    /// The panels that are on the screen.
+    /// The visible panels.
     pub seen: Vec<Pane>,
-    /// Where they are on the screen, points.
+    /// The screen rectangles of the visible panels, points.
     pub places: Vec<(Pane, egui::Rect)>,
-    /// The panel with the keyboard.
+    /// The panel with the keyboard focus.
     pub current: Option<Pane>,
-    /// Whether the keyboard goes into that panel in this frame.
+    /// Whether that panel takes the keyboard focus in this frame.
     pub takes_keyboard: bool,
-    /// The panels that are closed.
+    /// The closed panels.
     pub closed: Vec<Pane>,
-    /// The panel that fills the page.
+    /// The maximised panel.
     pub maximised: Option<Pane>,
-    /// A front tab that its strip is to scroll into view.
+    /// A front tab that its tab bar must scroll into view.
     scrolls_to: Option<TileId>,
 }
 
 impl<'a> Panels<'a> {
-    /// Shows `state` and puts what is asked for into `out`.
+    /// Creates the behaviour that shows `state` and pushes commands to `out`.
     pub(crate) fn new(state: &'a State, out: &'a mut Vec<Command>) -> Self {
         let (seen, places, closed) = (Vec::new(), Vec::new(), Vec::new());
         let (left_image, current, maximised, scrolls_to) = (None, None, None, None);
@@ -71,14 +71,14 @@ impl<'a> Panels<'a> {
         Self { state, out, left_image, seen, places, current, takes_keyboard, closed, maximised, scrolls_to }
     }
 
-    /// Shows a panel's contents on its ground, as a region that a screen reader and the keyboard find.
+    /// Shows a panel's contents on its background, as a region for screen readers and keyboard focus.
     fn framed(&mut self, ui: &mut Ui, pane: Pane, show: impl FnOnce(&mut Self, &mut Ui)) {
         let margin = pane.panel().margin();
         let place = ui.max_rect();
         self.places.push((pane, place));
         crate::tour::here(ui.ctx(), pane.title(), place);
         region(ui, pane.title(), place);
-        // The panel itself can have the keyboard, so that Tab goes on with what is in it.
+        // The panel itself is focusable, so that Tab continues with its contents.
         let whole =
             ui.interact(place, ui.scope_id().with("whole panel"), egui::Sense::focusable_noninteractive());
         whole.widget_info(|| {
@@ -87,7 +87,7 @@ impl<'a> Panels<'a> {
         if self.takes_keyboard && self.current == Some(pane) {
             whole.request_focus();
         }
-        // A panel that only keeps the focus must not take the turn of the one that gets it.
+        // A panel that only keeps the focus must not override the one that receives it.
         if whole.gained_focus() || is_pressed(ui, place) {
             self.current = Some(pane);
         }
@@ -96,7 +96,7 @@ impl<'a> Panels<'a> {
             ui.take_available_space();
         });
         if whole.has_focus() {
-            // A panel has nothing that arrows move: they step along the drive as everywhere else.
+            // Arrow keys have no use in a panel: they change the step as everywhere else.
             let arrows =
                 EventFilter { horizontal_arrows: true, vertical_arrows: true, ..EventFilter::default() };
             ui.memory_mut(|memory| memory.set_focus_lock_filter(whole.id, arrows));
@@ -106,7 +106,7 @@ impl<'a> Panels<'a> {
         }
     }
 
-    /// The menu of a group of tabs: what can be done with its front panel, and the closed panels.
+    /// The menu of a group of tabs: commands for its front panel, and the closed panels.
     fn menu(&mut self, ui: &mut Ui, front: Option<Pane>) {
         let name = front.map_or_else(|| "panels".to_owned(), |pane| format!("{} menu", pane.title()));
         let dots = egui::Button::new(RichText::new("...").color(theme::weak())).frame(false);
@@ -138,23 +138,23 @@ impl<'a> Panels<'a> {
     }
 }
 
-/// Under which name the panel that had the keyboard last is remembered.
+/// The id under which the last focused panel is stored.
 fn panel_with_keyboard() -> egui::Id {
     egui::Id::unique("panel with the keyboard")
 }
 
-/// Whether a control that has the keyboard is a whole panel, to which no key means anything.
+/// Whether a focused widget is a whole panel, which uses no keys itself.
 pub(crate) fn is_panel(context: &egui::Context, id: egui::Id) -> bool {
     context.data(|data| data.get_temp(panel_with_keyboard())) == Some(id)
 }
 
-/// Whether the pointer is pressed in a panel in this frame, and not on a window above it.
+/// Whether the pointer is pressed inside a panel in this frame, and not on a window above it.
 fn is_pressed(ui: &Ui, place: egui::Rect) -> bool {
     ui.input(|input| input.pointer.any_pressed()) && ui.rect_contains_pointer(place)
 }
 
-/// Whether a tab came to the front of its group a moment ago, or its strip got another width: by then the arrows beside the
-/// tabs have their places.
+/// Whether a tab came to the front of its group, or its tab bar changed width, at most three passes ago: egui needs these
+/// passes to lay out the arrows beside the tabs.
 fn is_new_front(ui: &Ui, group: TileId, tile: TileId) -> bool {
     let (now, width) = (ui.ctx().cumulative_pass_nr(), ui.max_rect().width());
     let id = egui::Id::unique("front tab").with(group);
@@ -166,7 +166,7 @@ fn is_new_front(ui: &Ui, group: TileId, tile: TileId) -> bool {
     })
 }
 
-/// Makes what `ui` holds a region with a name.
+/// Gives `ui` the role of a region with a name, for screen readers.
 pub(crate) fn region(ui: &Ui, name: &str, place: egui::Rect) {
     ui.ctx().accesskit_node_builder(ui.unique_id(), |node| {
         node.set_role(egui::Role::Region);
@@ -204,7 +204,7 @@ impl Behavior<Pane> for Panels<'_> {
         let name = tiles.get_pane(&tile).map(|pane| pane.title());
         button.ctx.accesskit_node_builder(button.id, |node| {
             node.set_role(egui::Role::Tab);
-            // What is painted is in capitals, which some readers would spell.
+            // The painted title is in capitals, which some screen readers spell out.
             node.set_label(name.unwrap_or("panels"));
         });
         if self.scrolls_to == Some(tile) {

@@ -1,38 +1,38 @@
-//! The arrangements that come with the page, as tables: rows and columns of groups of panels.
+//! The predefined arrangements as tables: rows and columns of groups of panels.
 //!
-//! All of them fit 1280 × 720. A panel that an arrangement leaves out comes back by the menu of any group of tabs or
-//! by the palette.
+//! All of them fit 1280 × 720. A panel that an arrangement does not contain can be opened by the menu of any group of tabs
+//! or by the palette.
 
 use egui_tiles::{Container, Linear, LinearDir, TileId, Tiles, Tree};
 use serde::{Deserialize, Serialize};
 
 use crate::panels::pane::{Group, Pane};
 
-/// An arrangement by name; Shift and its number calls it.
+/// A predefined arrangement; Shift and its number selects it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Preset {
-    /// Everything at a glance.
+    /// All panels.
     #[default]
     Overview,
-    /// How the template was matched.
+    /// Evidence of the template match.
     Match,
-    /// How the point was found in space.
+    /// Evidence of the stereo measurement.
     Stereo,
-    /// Where rover and target are.
+    /// Positions of rover and target.
     Map,
-    /// Runs beside each other.
+    /// Runs side by side.
     Compare,
-    /// Many runs at once.
+    /// Studies of many runs.
     Studies,
-    /// What is told of a drive.
+    /// The report of a drive.
     Report,
-    /// The image with little else.
+    /// The image with few other panels.
     Image,
 }
 
 impl Preset {
-    /// All of them, in the order of their numbers from 1 on.
+    /// All arrangements, in the order of their numbers from 1.
     pub const ALL: [Self; 8] = [
         Self::Overview,
         Self::Match,
@@ -58,7 +58,7 @@ impl Preset {
         }
     }
 
-    /// Its word in links.
+    /// Its word in links and storage.
     pub const fn word(self) -> &'static str {
         match self {
             Self::Overview => "overview",
@@ -72,7 +72,7 @@ impl Preset {
         }
     }
 
-    /// What it is for.
+    /// Its purpose.
     pub const fn purpose(self) -> &'static str {
         match self {
             Self::Overview => "everything at a glance",
@@ -86,7 +86,7 @@ impl Preset {
         }
     }
 
-    /// The panel that a narrow window has in front beside the left image.
+    /// The panel that a narrow window shows below the left image.
     pub(crate) const fn lead(self) -> Pane {
         match self {
             Self::Overview | Self::Image => Pane::Targets,
@@ -99,7 +99,7 @@ impl Preset {
         }
     }
 
-    /// The arrangement for images of this shape.
+    /// The tree of tiles for images of this shape.
     pub fn tree(self, shape: ImageShape) -> Tree<Pane> {
         let mut tiles = Tiles::default();
         let root = build(&mut tiles, self.table(shape));
@@ -122,7 +122,7 @@ impl Preset {
     }
 }
 
-/// The shape of a traverse's images, on which depends whether they stand beside or above each other.
+/// The shape of a traverse's images, which determines whether they are side by side or stacked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ImageShape {
@@ -140,7 +140,7 @@ impl ImageShape {
     }
 }
 
-/// For windows too narrow for two columns: the left image, and below it all other panels as tabs.
+/// The tree for windows too narrow for two columns: the left image, and below it all other panels as tabs.
 pub(crate) fn narrow() -> Tree<Pane> {
     let mut tiles = Tiles::default();
     let image = tabs(&mut tiles, &[Pane::Left]);
@@ -152,7 +152,7 @@ pub(crate) fn narrow() -> Tree<Pane> {
 
 /// A part of an arrangement; numbers are shares of its width or height.
 enum Area {
-    /// The panels whose home is one of these groups.
+    /// The panels of these groups in the overview.
     Home(&'static [Group]),
     /// These panels.
     Tabs(&'static [Pane]),
@@ -162,7 +162,7 @@ enum Area {
 
 use Area::{Column, Home, Row, Tabs};
 
-/// Every panel where it says that its home is: the left image large, beside it the target's close-up above other views.
+/// Every panel in its group: the left image large, beside it the target's close-up above other views.
 const OVERVIEW: Area = Row(&[
     (
         Column(&[
@@ -186,7 +186,7 @@ const OVERVIEW: Area = Row(&[
     (COLUMN, 0.24),
 ]);
 
-/// The same with the left image across, the other views below it.
+/// The same with the left image across the width and the other views below it.
 const WIDE_OVERVIEW: Area = Row(&[
     (
         Column(&[
@@ -208,7 +208,7 @@ const WIDE_OVERVIEW: Area = Row(&[
 
 const MAP_AND_PLOTS: &[Group] = &[Group::Map, Group::Plots, Group::Scores];
 
-/// Right of the images.
+/// The column right of the images.
 const COLUMN: Area = Column(&[
     (Home(&[Group::Lists]), 0.25),
     (Home(&[Group::Verdict]), 0.43),

@@ -1,5 +1,5 @@
-//! The arrangement in use: which panels are where, which has the keyboard, which fills the page. It is kept by the
-//! browser across reloads; an arrangement of another version, or one that is damaged, is left for the overview.
+//! The current arrangement: the tree of panels, the focused panel and the maximised panel. The browser stores the tree
+//! across reloads; a stored tree that is invalid or of another version is replaced by the overview.
 
 use egui::Ui;
 use egui_tiles::{Container, Tile, TileId, Tree};
@@ -14,28 +14,28 @@ use crate::theme;
 /// Windows narrower than this have one column, points.
 const NARROW: f32 = 900.0;
 
-/// The version of the kept form.
-const KEPT_FORMAT: u32 = 2;
+/// The version of the stored format.
+const STORED_FORMAT: u32 = 2;
 
-/// The arrangement in use.
+/// The current arrangement.
 pub(crate) struct Workspace {
     tree: Tree<Pane>,
     narrow: Tree<Pane>,
     preset: Preset,
-    /// The shape of the images that the arrangement was made for.
+    /// The shape of the images for which the tree was built.
     shape: ImageShape,
     maximised: Option<Pane>,
     current: Option<Pane>,
-    /// The panels on the screen, in reading order.
+    /// The visible panels, in reading order.
     seen: Vec<Pane>,
     is_narrow: bool,
-    /// Whether the keyboard is to go into the current panel.
+    /// Whether the current panel takes the keyboard focus in the next frame.
     wants_keyboard: bool,
 }
 
-/// What the browser keeps.
+/// The stored form.
 #[derive(Serialize, Deserialize)]
-struct Kept {
+struct StoredLayout {
     format: u32,
     preset: Preset,
     shape: ImageShape,
@@ -59,31 +59,35 @@ impl Default for Workspace {
 }
 
 impl Workspace {
-    /// The arrangement that was kept; the overview where there is none, or none that can be used.
-    pub(crate) fn restored(kept: Option<&str>) -> Self {
-        let kept = kept.and_then(|text| serde_json::from_str::<Kept>(text).ok());
-        let usable = kept.filter(|kept| kept.format == KEPT_FORMAT && is_sound(&kept.tree));
-        usable.map_or_else(Self::default, |kept| Self {
-            tree: kept.tree,
-            preset: kept.preset,
-            shape: kept.shape,
+    /// Restores a stored arrangement; the overview if there is none or it is invalid.
+    pub(crate) fn restored(stored: Option<&str>) -> Self {
+        let stored = stored.and_then(|text| serde_json::from_str::<StoredLayout>(text).ok());
+        let usable = stored.filter(|stored| stored.format == STORED_FORMAT && is_sound(&stored.tree));
+        usable.map_or_else(Self::default, |stored| Self {
+            tree: stored.tree,
+            preset: stored.preset,
+            shape: stored.shape,
             ..Self::default()
         })
     }
 
-    /// What the browser is to keep.
-    pub(crate) fn kept(&self) -> String {
-        let kept =
-            Kept { format: KEPT_FORMAT, preset: self.preset, shape: self.shape, tree: self.tree.clone() };
-        serde_json::to_string(&kept).unwrap_or_default()
+    /// The arrangement as stored by the browser.
+    pub(crate) fn to_stored(&self) -> String {
+        let stored = StoredLayout {
+            format: STORED_FORMAT,
+            preset: self.preset,
+            shape: self.shape,
+            tree: self.tree.clone(),
+        };
+        serde_json::to_string(&stored).unwrap_or_default()
     }
 
-    /// The arrangement that was chosen last.
+    /// The last selected arrangement.
     pub(crate) fn preset(&self) -> Preset {
         self.preset
     }
 
-    /// The panels that are closed.
+    /// The closed panels.
     pub(crate) fn closed(&self) -> Vec<Pane> {
         Pane::ALL.into_iter().filter(|pane| self.tree.tiles.find_pane(pane).is_none()).collect()
     }
@@ -105,7 +109,7 @@ impl Workspace {
         }
     }
 
-    /// Takes in the size of the images, px. An arrangement that nobody changed follows their shape.
+    /// Sets the size of the images, px. An unmodified arrangement is rebuilt for their shape.
     pub(crate) fn fit_images(&mut self, size: [u32; 2]) {
         let shape = ImageShape::of(size);
         if shape == self.shape {
@@ -117,7 +121,7 @@ impl Workspace {
         self.shape = shape;
     }
 
-    /// Whether no panel was moved, closed or resized since the arrangement was chosen.
+    /// Whether no panel was moved, closed or resized since the arrangement was selected.
     fn is_as_it_came(&self) -> bool {
         let places = |tree: &Tree<Pane>| {
             let tiles = tree.tiles.tiles();
@@ -147,9 +151,9 @@ impl Workspace {
         (self.current, self.wants_keyboard) = (Some(pane), true);
         let tree = self.tree_in_use();
         if tree.tiles.find_pane(&pane).is_none() {
-            bring_back(tree, pane);
+            restore_pane(tree, pane);
         }
-        // In the other one, too: a window may be resized.
+        // In both trees, because the window may be resized.
         [&mut self.tree, &mut self.narrow].into_iter().for_each(|tree| bring_to_front(tree, pane));
     }
 
@@ -172,7 +176,7 @@ impl Workspace {
         (self.current, self.wants_keyboard) = (Some(self.seen[next]), true);
     }
 
-    /// Lays the panels out.
+    /// Shows the panels.
     pub(crate) fn show(&mut self, ui: &mut Ui, panels: &mut Panels<'_>) {
         self.is_narrow = ui.ctx().content_rect().width() < NARROW;
         panels.current = self.current;
@@ -197,7 +201,7 @@ fn bring_to_front(tree: &mut Tree<Pane>, pane: Pane) {
     tree.make_active(|_, tile| matches!(tile, Tile::Pane(other) if *other == pane));
 }
 
-/// What stands where every panel was closed.
+/// Shown if all panels are closed.
 fn all_closed(ui: &mut Ui, panels: &mut Panels<'_>) {
     ui.centered_and_justified(|ui| {
         let words = theme::label("Every panel is closed. Press Shift+1, or click here, for the overview.");
@@ -207,7 +211,7 @@ fn all_closed(ui: &mut Ui, panels: &mut Panels<'_>) {
     });
 }
 
-/// Whether every tile that a tree names exists, and no panel does twice.
+/// Whether every tile of a tree exists, and no panel is in it twice.
 fn is_sound(tree: &Tree<Pane>) -> bool {
     let Some(root) = tree.root else { return true };
     let mut panes = Vec::new();
@@ -225,8 +229,8 @@ fn is_sound(tree: &Tree<Pane>) -> bool {
     true
 }
 
-/// Puts a closed panel behind the tabs of the largest group, or beside what there is.
-fn bring_back(tree: &mut Tree<Pane>, pane: Pane) {
+/// Adds a closed panel to the largest group of tabs; without a group, as the only one.
+fn restore_pane(tree: &mut Tree<Pane>, pane: Pane) {
     let tile = tree.tiles.insert_pane(pane);
     let group = largest_group(tree);
     match group.and_then(|id| tree.tiles.get_mut(id)) {
@@ -235,7 +239,7 @@ fn bring_back(tree: &mut Tree<Pane>, pane: Pane) {
     }
 }
 
-/// The group of tabs with the most panels; the one that shows the left image stays free.
+/// The group of tabs with the most panels, other than that of the left image if there is another.
 fn largest_group(tree: &Tree<Pane>) -> Option<TileId> {
     let left = tree.tiles.find_pane(&Pane::Left);
     let groups = tree.tiles.iter().filter_map(|(id, tile)| match tile {
@@ -250,7 +254,7 @@ fn largest_group(tree: &Tree<Pane>) -> Option<TileId> {
 }
 
 impl Panels<'_> {
-    /// Shows one panel with the whole page.
+    /// Shows one panel in the whole page.
     fn show_alone(&mut self, ui: &mut Ui, pane: Pane) {
         ui.horizontal(|ui| {
             ui.label(theme::title(pane.title()));
@@ -275,27 +279,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_arrangement_comes_back_as_it_was_kept() {
+    fn a_stored_arrangement_is_restored() {
         let mut workspace = Workspace::default();
         workspace.apply(LayoutCommand::Use(Preset::Stereo));
         workspace.apply(LayoutCommand::Close(Pane::Gates));
-        let again = Workspace::restored(Some(&workspace.kept()));
+        let again = Workspace::restored(Some(&workspace.to_stored()));
         assert_eq!(again.preset(), Preset::Stereo);
         assert!(again.closed().contains(&Pane::Gates) && !again.closed().contains(&Pane::Right));
         assert!(again.tree == workspace.tree);
     }
 
     #[test]
-    fn what_is_damaged_or_of_another_version_gives_the_overview() {
-        let kept = Workspace::default().kept();
+    fn an_unusable_stored_layout_gives_the_overview() {
+        let stored = Workspace::default().to_stored();
         for text in [
             "",
             "{}",
             "[1, 2",
-            &kept.replace("\"format\":2", "\"format\":9"),
-            &kept.replace("\"gates\"", "\"no such panel\""),
-            // A panel twice.
-            &kept.replace("\"gates\"", "\"left\""),
+            &stored.replace("\"format\":2", "\"format\":9"),
+            &stored.replace("\"gates\"", "\"no such panel\""),
+            // The same panel twice.
+            &stored.replace("\"gates\"", "\"left\""),
         ] {
             let restored = Workspace::restored(Some(text));
             assert!(restored.closed().is_empty(), "{text}");
@@ -334,7 +338,7 @@ mod tests {
         assert!(active.contains(&gates));
     }
 
-    /// The workspace on a page with one panel beside the other, in an order that Q follows.
+    /// The workspace on a page with several panels side by side, in the order of Q.
     fn page() -> egui_kittest::Harness<'static, Workspace> {
         let state = crate::tests::fixture::nothing();
         let mut harness = egui_kittest::Harness::builder().with_size([1280.0, 720.0]).build_ui_state(

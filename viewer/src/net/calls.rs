@@ -1,6 +1,6 @@
-//! Calls of endpoints that wait for their answers, each with the function of `S` that takes its reply.
+//! Pending calls of endpoints, each with the function of `S` that receives its reply.
 //!
-//! This is how a feature calls the server: it names the endpoint and takes the typed reply, in one place.
+//! A feature names the endpoint and handles the typed reply in one place.
 
 use std::collections::BTreeMap;
 
@@ -10,36 +10,36 @@ use sightline_api::wire::Problem;
 use crate::net::reply::parse;
 use crate::net::request::Request;
 
-/// Takes the answer to a call: the body of the reply, or the problem.
+/// Receives the outcome of a call: the body of the reply, or the problem.
 type Take<S> = Box<dyn FnOnce(&mut S, &Call, Result<Vec<u8>, Problem>)>;
 
-/// A call that waits for its answer.
-pub(crate) struct Waiting<S> {
+/// A pending call.
+pub(crate) struct PendingCall<S> {
     call: Call,
     take: Take<S>,
 }
 
-impl<S> Waiting<S> {
-    /// Passes the answer on.
+impl<S> PendingCall<S> {
+    /// Passes the outcome to the receiver.
     pub(crate) fn end(self, state: &mut S, outcome: Result<Vec<u8>, Problem>) {
         (self.take)(state, &self.call, outcome);
     }
 }
 
-/// Calls that wait for their answers.
+/// The pending calls, by ticket.
 pub(crate) struct Calls<S> {
-    waiting: BTreeMap<u64, Waiting<S>>,
+    pending: BTreeMap<u64, PendingCall<S>>,
     next: u64,
 }
 
 impl<S> Default for Calls<S> {
     fn default() -> Self {
-        Self { waiting: BTreeMap::new(), next: 0 }
+        Self { pending: BTreeMap::new(), next: 0 }
     }
 }
 
 impl<S> Calls<S> {
-    /// The request that calls `E`; `take` gets the call with the reply or the problem.
+    /// Registers a call of `E` and returns its request; `take` receives the call with its reply or problem.
     pub(crate) fn begin<E: Endpoint>(
         &mut self,
         call: Call,
@@ -50,18 +50,18 @@ impl<S> Calls<S> {
         let take: Take<S> = Box::new(|state, call, outcome| {
             take(state, call, outcome.and_then(|bytes| parse::<E>(&bytes)));
         });
-        self.waiting.insert(ticket, Waiting { call: call.clone(), take });
+        self.pending.insert(ticket, PendingCall { call: call.clone(), take });
         Request::Call { ticket, call }
     }
 
-    /// Takes out the call of a ticket; `None` if it was answered before.
-    pub(crate) fn take(&mut self, ticket: u64) -> Option<Waiting<S>> {
-        self.waiting.remove(&ticket)
+    /// Removes and returns the call of a ticket; `None` if it was answered before.
+    pub(crate) fn take(&mut self, ticket: u64) -> Option<PendingCall<S>> {
+        self.pending.remove(&ticket)
     }
 
-    /// The waiting calls with their tickets, oldest first.
+    /// The pending calls with their tickets, oldest first.
     #[cfg(test)]
     pub(crate) fn iter(&self) -> impl Iterator<Item = (u64, &Call)> {
-        self.waiting.iter().map(|(ticket, waiting)| (*ticket, &waiting.call))
+        self.pending.iter().map(|(ticket, pending)| (*ticket, &pending.call))
     }
 }

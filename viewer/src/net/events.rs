@@ -1,4 +1,4 @@
-//! The server's events over a WebSocket, connected again with growing patience when it is lost.
+//! The server's events over a WebSocket, which is reconnected after increasing delays.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -7,77 +7,78 @@ use std::time::Duration;
 use ewebsock::{Options, WsEvent, WsMessage, WsReceiver, WsSender};
 use sightline_api::event::Event;
 
-/// The longest pause between two attempts, s.
+/// Maximum delay between two connection attempts, s.
 const PATIENCE_S: f64 = 10.0;
 
-/// After how long at the latest the page takes in what nobody waits for; mostly it comes with a frame that is laid out
-/// anyway.
+/// Maximum delay before events and invisible replies are handled. Usually another repaint handles them earlier.
 pub(super) const UNHURRIED: Duration = Duration::from_millis(50);
-/// The same while events stream in: a quick run needs the processors more than a picture of each of its steps.
+/// The same during a stream of events: a fast run needs the processor more than a repaint for each of its steps.
 const STREAMING: Duration = Duration::from_millis(150);
-/// So many events at a time are a stream.
+/// Minimum number of events per poll that counts as a stream.
 const STREAM_LENGTH: usize = 6;
 
-/// How the server's events come in.
+/// State of the event connection.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Connection {
     /// The first attempt is under way.
     #[default]
     Connecting,
-    /// Events come in.
+    /// Connected; events are received.
     Live,
-    /// The server does not answer.
+    /// The server does not respond.
     Gone {
-        /// Attempts so far.
+        /// Failed attempts so far.
         attempts: u32,
     },
 }
 
-/// The events of one server.
+/// The event connection to one server.
 pub(super) struct Events {
     url: String,
     context: egui::Context,
-    // The sender closes the connection when it is dropped.
+    // Dropping the sender closes the connection.
     socket: Option<(WsSender, WsReceiver)>,
     is_open: bool,
     attempts: u32,
     retry_at: f64,
-    /// Whether the last events came as a stream.
+    /// Whether the last poll returned a stream of events.
     is_stream: Arc<AtomicBool>,
 }
 
 impl Events {
-    /// The events of the server at `origin`; the first poll connects.
+    /// The connection to the server at `origin`; the first poll opens it.
     pub(super) fn new(origin: &str, context: egui::Context) -> Self {
         let url = format!("{}/api/v1/events", origin.replacen("http", "ws", 1));
         let is_stream = Arc::default();
         Self { url, context, socket: None, is_open: false, attempts: 0, retry_at: 0.0, is_stream }
     }
 
-    /// Does not wait for the next attempt.
+    /// Makes the next poll reconnect at once, unless a connection is open.
     pub(super) fn reconnect_now(&mut self) {
         if !self.is_open {
             (self.socket, self.retry_at) = (None, 0.0);
         }
     }
 
-    /// When the next attempt is due, while there is no connection.
+    /// Time of the next attempt, s; `None` while there is a connection.
     pub(super) fn retry_at(&self) -> Option<f64> {
         self.socket.is_none().then_some(self.retry_at)
     }
 
-    /// What was told since the last time, and how the connection is.
+    /// Returns the events since the last poll and the state of the connection.
     pub(super) fn poll(&mut self, now: f64) -> (Vec<Event>, Connection) {
         if self.socket.is_none() && now >= self.retry_at {
             self.connect(now);
         }
-        let mut told = Vec::new();
+        let mut events = Vec::new();
         let mut is_lost = false;
         while let Some(event) = self.socket.as_ref().and_then(|(_, receiver)| receiver.try_recv()) {
             match event {
                 WsEvent::Opened => (self.is_open, self.attempts) = (true, 0),
-                // An event that this page does not know is for a newer one.
-                WsEvent::Message(WsMessage::Text(text)) => told.extend(serde_json::from_str::<Event>(&text)),
+                // Events of unknown kinds are for newer versions of the page.
+                WsEvent::Message(WsMessage::Text(text)) => {
+                    events.extend(serde_json::from_str::<Event>(&text))
+                }
                 WsEvent::Message(_) => {}
                 WsEvent::Error(_) | WsEvent::Closed => is_lost = true,
             }
@@ -85,8 +86,8 @@ impl Events {
         if is_lost {
             self.lose(now);
         }
-        self.is_stream.store(told.len() >= STREAM_LENGTH, Relaxed);
-        (told, self.connection())
+        self.is_stream.store(events.len() >= STREAM_LENGTH, Relaxed);
+        (events, self.connection())
     }
 
     fn connection(&self) -> Connection {

@@ -1,18 +1,18 @@
-//! Requests over HTTP, and problems as values.
+//! HTTP requests; failures are returned as problems.
 
 use ehttp::Headers;
 use sightline_api::endpoint::Method;
 use sightline_api::wire::Problem;
 
 use crate::net::items;
-use crate::net::request::{Arrived, Reply, Request};
+use crate::net::request::{CompletedRequest, Reply, Request};
 
-/// Sends `request` to the server at `origin` and hands the answer to `done`, perhaps on another thread.
+/// Sends `request` to the server at `origin` and passes the answer to `done`, possibly on another thread.
 pub(super) fn send(
     origin: &str,
     request: Request,
     context: &egui::Context,
-    done: impl FnOnce(Arrived) + Send + 'static,
+    done: impl FnOnce(CompletedRequest) + Send + 'static,
 ) {
     let call = match &request {
         Request::Call { call, .. } => call.clone(),
@@ -21,9 +21,9 @@ pub(super) fn send(
     };
     let mut http = ehttp::Request::get(format!("{origin}/api/v1/{}", call.path));
     http.method = method(call.method);
-    // Rendering an image or designating a target has no time limit.
+    // No timeout: rendering an image or designating a target can take long.
     http.timeout = None;
-    // The cookie with the access token, which is left out by default.
+    // Sends the cookie with the access token, which `ehttp` omits by default.
     #[cfg(target_arch = "wasm32")]
     {
         http.credentials = ehttp::Credentials::SameOrigin;
@@ -39,7 +39,7 @@ pub(super) fn send(
     ehttp::fetch(http, move |answer| {
         let outcome = match answer {
             Ok(response) if response.ok => match &request {
-                // The server is still making the item.
+                // 202: the server is still computing the item.
                 Request::Item(_) if response.status == 202 => Err(problem(&response)),
                 Request::Item(key) => items::read(key, &response.bytes, &context).map(Reply::Item),
                 Request::Call { .. } | Request::Reconnect => Ok(Reply::Body(response.bytes)),
@@ -47,7 +47,7 @@ pub(super) fn send(
             Ok(response) => Err(problem(&response)),
             Err(why) => Err(unreachable(&why.to_string())),
         };
-        done(Arrived { request, outcome });
+        done(CompletedRequest { request, outcome });
     });
 }
 
@@ -61,7 +61,7 @@ const fn method(method: Method) -> ehttp::Method {
     }
 }
 
-/// The problem in a response that is no success.
+/// The problem that an unsuccessful response describes.
 fn problem(response: &ehttp::Response) -> Problem {
     serde_json::from_slice(&response.bytes).unwrap_or_else(|_| {
         let detail = format!("The server answered {} {}.", response.status, response.status_text);

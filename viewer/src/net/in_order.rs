@@ -1,16 +1,16 @@
-//! Requests that are sent one after the other. Connections are parallel, so that a removal could otherwise overtake the
-//! change that it takes back.
+//! Requests that are sent one after the other. On parallel connections, a removal could overtake the change that it
+//! reverts.
 
 use std::collections::VecDeque;
 
 use crate::net::request::Request;
 
-/// The unanswered requests; the first one is under way.
+/// The unanswered requests, oldest first; the first one has been sent.
 #[derive(Default)]
 pub(super) struct InOrder(VecDeque<Request>);
 
 impl InOrder {
-    /// Adds a request; returns it if it can be sent at once.
+    /// Appends a request; returns it if it can be sent at once.
     pub(super) fn add(&mut self, request: Request) -> Option<Request> {
         self.0.push_back(request);
         if self.0.len() == 1 { self.0.front().cloned() } else { None }

@@ -1,4 +1,4 @@
-//! Images, arrays and records: their endpoints, and how the files become rasters and tables.
+//! Images, arrays and records: their endpoints, and the conversion of the files to rasters and tables.
 
 use std::sync::Arc;
 
@@ -18,11 +18,11 @@ use crate::driving::hazards::HazardRaster;
 use crate::net::reply::{misread, parse};
 use crate::tables::Table;
 
-/// The call that reads an item. A single array comes with all arrays of its step.
+/// The call that reads an item. A single array is read with all arrays of its step.
 pub(crate) fn call(key: &Key) -> Call {
     match key {
-        Key::Image { traverse, step, eye, camera } => {
-            let (id, file) = (traverse.clone(), format!("{}.png", eye.word()));
+        Key::Image { traverse, step, side, camera } => {
+            let (id, file) = (traverse.clone(), format!("{}.png", side.word()));
             let wish = ImageWish { bits: None, camera: *camera };
             Call::with_query::<ShowImage>(&AtImage { id, step: *step, file }, &wish)
         }
@@ -40,7 +40,7 @@ pub(crate) fn call(key: &Key) -> Call {
     }
 }
 
-/// Reads the body of an answer.
+/// Parses the body of an answer.
 pub(super) fn read(key: &Key, bytes: &[u8], context: &egui::Context) -> Result<Item, Problem> {
     match key {
         Key::Stop { .. } => Ok(Item::Stop(Arc::new(parse::<ShowStop>(bytes)?))),
@@ -51,15 +51,15 @@ pub(super) fn read(key: &Key, bytes: &[u8], context: &egui::Context) -> Result<I
         Key::EarlierTemplates(_) => Ok(Item::EarlierTemplates(parse::<ShowEarlierTemplates>(bytes)?)),
         Key::Times(_) => Ok(Item::Times(parse::<ShowTimes>(bytes)?)),
         Key::Trace(_) => Ok(Item::Trace(Arc::new(parse::<ShowStep>(bytes)?))),
-        Key::Image { step, eye, .. } => {
-            let name = format!("the {} image of step {step}", eye.word());
+        Key::Image { step, side, .. } => {
+            let name = format!("the {} image of step {step}", side.word());
             let raster = Raster::from_png(context, &name, bytes).map_err(|why| misread(&why))?;
             Ok(Item::Raster(Arc::new(raster)))
         }
         Key::Array(step, _) | Key::Arrays(step) => {
             let name = format!("the arrays of step {}", step.step);
             let files = npz::decode(bytes, name).map_err(|why| misread(&why.to_string()))?;
-            // One that this page does not know is for a newer one.
+            // Unknown arrays are for newer versions of the page.
             let known = files.iter().filter_map(|(word, file)| Some((ArrayName::from_word(word)?, file)));
             let read = known.map(|(name, file)| Ok((name, read_array(name, file, context)?)));
             read.collect::<Result<_, _>>().map(Item::Arrays)
@@ -79,7 +79,7 @@ fn read_array(name: ArrayName, bytes: &[u8], context: &egui::Context) -> Result<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cache::{Eye, StepKey};
+    use crate::cache::{ImageSide, StepKey};
 
     #[test]
     fn every_thing_has_its_path() {
@@ -87,7 +87,7 @@ mod tests {
         let image = |camera: Option<&str>| Key::Image {
             traverse: "t".to_owned(),
             step: 7,
-            eye: Eye::Right,
+            side: ImageSide::Right,
             camera: camera.map(|name| name.parse().unwrap()),
         };
         assert_eq!(call(&image(None)).path, "traverses/t/steps/7/images/right.png");

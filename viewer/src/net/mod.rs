@@ -1,4 +1,4 @@
-//! Everything that crosses the network. Nothing here blocks: answers come in through a channel.
+//! The network. Nothing here blocks: answers arrive through a channel.
 
 pub(crate) mod events;
 pub(crate) mod calls;
@@ -15,21 +15,21 @@ use sightline_api::event::Event;
 
 use self::events::{Connection, Events, UNHURRIED};
 use self::in_order::InOrder;
-use self::request::{Arrived, Request};
+use self::request::{CompletedRequest, Request};
 use crate::cache::Key;
 
-/// Maximum number of images, arrays and records under way.
+/// Maximum number of concurrent requests for images, arrays and records.
 const AT_A_TIME: usize = 6;
 
-/// Maximum number of images among them that must be rendered first: a browser has few connections to one server.
+/// Maximum number of images among them that must be rendered first: a browser opens few connections per server.
 const SLOW_AT_A_TIME: usize = 2;
 
 /// The network side of the page.
 pub(crate) struct Net {
     origin: String,
     context: egui::Context,
-    sender: Sender<Arrived>,
-    receiver: Receiver<Arrived>,
+    sender: Sender<CompletedRequest>,
+    receiver: Receiver<CompletedRequest>,
     under_way: HashSet<Key>,
     slow: HashSet<Key>,
     in_order: InOrder,
@@ -37,7 +37,7 @@ pub(crate) struct Net {
 }
 
 impl Net {
-    /// Talks to the server at `origin`; wakes `context` when something arrives.
+    /// The network side for the server at `origin`; wakes `context` when an answer arrives.
     pub(crate) fn new(origin: String, context: egui::Context) -> Self {
         let (sender, receiver) = channel();
         let events = Events::new(&origin, context.clone());
@@ -45,7 +45,7 @@ impl Net {
         Self { origin, context, sender, receiver, under_way, slow, in_order, events }
     }
 
-    /// Reserves a place for an item that is requested next; false if all are taken.
+    /// Reserves a slot for an item that is requested next; `false` if none is free.
     pub(crate) fn take_place(&mut self, key: &Key, is_slow: bool) -> bool {
         let is_place = self.under_way.len() < AT_A_TIME && (!is_slow || self.slow.len() < SLOW_AT_A_TIME);
         if is_place {
@@ -72,10 +72,10 @@ impl Net {
 
     fn send_now(&self, request: Request) {
         let (sender, context) = (self.sender.clone(), self.context.clone());
-        http::send(&self.origin, request, &self.context, move |arrived| {
-            let is_invisible = arrived.request.is_invisible();
-            // Without a receiver the page is closing, and nobody waits for the answer.
-            match sender.send(arrived) {
+        http::send(&self.origin, request, &self.context, move |completed| {
+            let is_invisible = completed.request.is_invisible();
+            // Without a receiver the page is closing and the answer is not needed.
+            match sender.send(completed) {
                 Ok(()) if is_invisible => context.request_repaint_after(UNHURRIED),
                 Ok(()) => context.request_repaint(),
                 Err(_) => {}
@@ -84,9 +84,9 @@ impl Net {
     }
 
     /// The answers since the last call.
-    pub(crate) fn poll(&mut self) -> Vec<Arrived> {
-        let arrived: Vec<Arrived> = self.receiver.try_iter().collect();
-        for answer in &arrived {
+    pub(crate) fn poll(&mut self) -> Vec<CompletedRequest> {
+        let completed: Vec<CompletedRequest> = self.receiver.try_iter().collect();
+        for answer in &completed {
             if let Request::Item(key) = &answer.request {
                 self.under_way.remove(key);
                 self.slow.remove(key);
@@ -95,15 +95,15 @@ impl Net {
                 self.send_now(next);
             }
         }
-        arrived
+        completed
     }
 
-    /// When the events want to be polled next although nothing arrived.
+    /// Time at which the events must be polled even if nothing has arrived, s.
     pub(crate) fn retry_at(&self) -> Option<f64> {
         self.events.retry_at()
     }
 
-    /// The events since the last time, and how they come in.
+    /// Returns the events since the last poll and the state of their connection.
     pub(crate) fn poll_events(&mut self, now: f64) -> (Vec<Event>, Connection) {
         self.events.poll(now)
     }

@@ -12,21 +12,21 @@ use crate::cache::{Item, Key};
 /// A request of the page.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Request {
-    /// Calls an endpoint; the reader of its reply waits under the ticket.
+    /// Calls an endpoint.
     Call {
-        /// The number of the waiting reader ([`crate::net::calls`]).
+        /// The number under which [`crate::net::calls`] stores the receiver of the reply.
         ticket: u64,
         /// The call.
         call: Call,
     },
     /// Reads an image, an array or a record.
     Item(Key),
-    /// Connects to the events again at once.
+    /// Reconnects to the events at once.
     Reconnect,
 }
 
-/// The calls that are sent one after the other: quick changes that a user makes and takes back, and the list that they
-/// change. Connections are parallel, so that a removal could otherwise overtake the change that it takes back.
+/// The calls that are sent one after the other: quick changes that a user makes and undoes, and the list that they change.
+/// On parallel connections, a removal could overtake the change that it reverts.
 const IN_ORDER: [fn(&Call) -> bool; 13] = [
     Call::is_to::<RemoveTarget>,
     Call::is_to::<RestoreTarget>,
@@ -44,12 +44,12 @@ const IN_ORDER: [fn(&Call) -> bool; 13] = [
 ];
 
 impl Request {
-    /// Whether this is sent only after all earlier requests of this kind are answered.
+    /// Whether the request is sent only after all earlier requests of this kind are answered.
     pub(crate) fn is_in_order(&self) -> bool {
         matches!(self, Self::Call { call, .. } if IN_ORDER.iter().any(|is_to| is_to(call)))
     }
 
-    /// Whether the answer changes nothing that is shown.
+    /// Whether the answer changes nothing on the screen.
     pub(crate) fn is_invisible(&self) -> bool {
         matches!(self, Self::Call { call, .. } if call.is_to::<MoveCursor>())
     }
@@ -64,7 +64,7 @@ pub enum Reply {
 }
 
 /// An answer with its request.
-pub struct Arrived {
+pub struct CompletedRequest {
     /// The request.
     pub request: Request,
     /// The answer, or why there is none.

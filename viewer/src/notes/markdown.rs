@@ -1,4 +1,4 @@
-//! A note's Markdown as text with emphasis; headings are strong, lists have marks, links show their address on their own.
+//! Lays out a note's Markdown as text with emphasis: headings are bold, lists have marks, links show their address.
 
 use egui::text::{LayoutJob, TextFormat};
 use egui::{Color32, FontFamily, FontId, Stroke};
@@ -9,7 +9,7 @@ use crate::theme;
 /// Size of the text, points.
 const SIZE: f32 = 13.0;
 
-/// The text, laid out.
+/// Lays out the text.
 pub(crate) fn layout(text: &str) -> LayoutJob {
     let mut writer = Writer::default();
     for event in Parser::new_ext(text, Options::ENABLE_STRIKETHROUGH) {
@@ -25,7 +25,7 @@ struct Writer {
     emphasised: usize,
     struck: usize,
     code: usize,
-    /// The next number of each open list; none where it has bullets.
+    /// The next number of each open list; `None` for a bulleted list.
     lists: Vec<Option<u64>>,
     links: Vec<String>,
 }

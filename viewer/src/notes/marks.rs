@@ -1,4 +1,4 @@
-//! Where notes are pinned: marks on the timeline and on the left image.
+//! Marks of the notes on the timeline and on the left image.
 
 use egui::{Painter, Rect, Stroke, StrokeKind, pos2, vec2};
 
@@ -10,9 +10,9 @@ use crate::theme;
 
 /// Side of a mark, points.
 const SIDE: f32 = 6.0;
-/// Least distance of two marks on the timeline, points.
+/// Minimum distance of two marks on the timeline, points.
 const APART: f32 = 7.0;
-/// Letters of a note that a tooltip shows.
+/// Maximum length of a note in a tooltip, characters.
 const LETTERS: usize = 60;
 
 /// Paints the steps with notes in the lane above the state bands.
@@ -45,7 +45,7 @@ pub(crate) fn words(state: &State, step: usize) -> Vec<String> {
     state.notes_at(step).into_iter().map(|note| format!("note: {}", begin(&note.text))).collect()
 }
 
-/// The steps with notes of the run at the cursor, or of the stop alone, in order.
+/// The steps with notes of the selected run, or of the stop only, in order.
 fn steps(state: &State) -> Vec<usize> {
     let pinned = state.notes.list.iter().flatten().map(|note| note.pin.step);
     let mut steps: Vec<usize> = pinned.filter(|step| !state.notes_at(*step).is_empty()).collect();

@@ -1,7 +1,7 @@
-//! Notes of the open session: what a person wrote about places of the drive, in the order of a tour.
+//! Notes of the open session: the user's texts about positions on the drive, in the order of a tour.
 //!
-//! A note that is being written is a draft here, so that nothing of it is lost: neither by closing its window nor by a
-//! refusal of the server.
+//! A note being written is a draft here, so that its text is lost neither by closing its window nor by a refusal of the
+//! server.
 
 pub(crate) mod panel;
 pub(crate) mod markdown;
@@ -10,60 +10,60 @@ mod update;
 
 use sightline_session::notes::{Note, Pin};
 
-/// What a person asks of notes.
+/// A command about notes.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Ask {
-    /// Begins a note at the cursor.
+pub enum NotesCommand {
+    /// Starts a note at the cursor.
     Pin,
-    /// Begins to change a note.
+    /// Starts to edit a note.
     Edit(u64),
-    /// Changes the words of what is being written.
+    /// Changes the text of the draft.
     Write(String),
-    /// Keeps what was written.
+    /// Saves the draft.
     Save,
-    /// Closes the window; the words of a new note stay for the next time.
+    /// Closes the window; the text of a new note is kept for the next time.
     Close,
     /// Removes a note.
     Remove(u64),
-    /// Brings a removed note back.
+    /// Restores a removed note.
     Restore(u64),
-    /// Moves a note to another place in the list.
+    /// Moves a note to another position in the list.
     Move {
-        /// The note.
+        /// Number of the note.
         id: u64,
-        /// Its new place, from 0.
+        /// Its new index, from 0.
         place: usize,
     },
-    /// Goes to where a note is pinned.
+    /// Goes to the step of a note.
     GoTo(u64),
-    /// Goes to the next note of the tour, or back.
+    /// Moves by this many notes in the tour; backward if negative.
     Tour(isize),
 }
 
-/// A note that is being written.
+/// A note being written.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Draft {
-    /// The note that is changed, with the revision that was read; none for a new one.
+    /// The note being edited and the revision that was read; `None` for a new note.
     pub of: Option<(u64, u64)>,
-    /// Where a new one is pinned.
+    /// The position on the drive to which a new note is pinned.
     pub pin: Pin,
-    /// Its words so far.
+    /// The text so far.
     pub text: String,
 }
 
-/// The notes.
+/// State of the notes.
 #[derive(Clone, Debug, Default)]
 pub struct Notes {
-    /// The notes in their order; none before the server has said.
+    /// The notes in order; `None` until received.
     pub list: Option<Vec<Note>>,
-    /// The note that is being written, while its window is open.
+    /// The note being written, while its window is open.
     pub draft: Option<Draft>,
-    /// The note that was gone to last.
+    /// The note visited last.
     pub at: Option<u64>,
-    /// The note that was removed last, which can be brought back.
+    /// The note removed last, which can be restored.
     pub removed: Option<Note>,
-    /// Words of a new note whose window was closed.
-    kept: String,
-    /// The session whose notes were asked for.
-    asked: Option<String>,
+    /// Text of a new note whose window was closed.
+    unsaved_text: String,
+    /// The session whose notes were requested.
+    requested_for: Option<String>,
 }

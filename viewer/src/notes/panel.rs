@@ -1,4 +1,4 @@
-//! The notes of the session: a list in the order of a tour, and the window in which one is written.
+//! The notes of the session: a list in the order of a tour, and the window in which a note is written.
 
 use egui::{Align, Id, Key, Layout, Modal, Modifiers, RichText, ScrollArea, TextEdit, Ui};
 use sightline_session::notes::{Note, TEXT_LIMIT};
@@ -6,13 +6,13 @@ use sightline_session::notes::{Note, TEXT_LIMIT};
 use crate::command::Command;
 use crate::command::table::PIN_NOTE;
 use crate::notes::markdown;
-use crate::notes::{Ask, Draft};
+use crate::notes::{Draft, NotesCommand};
 use crate::panels::pane::Pane;
 use crate::panels::panel::Panel;
 use crate::state::{State, run_letter};
 use crate::{panels, theme};
 
-/// What the panel is for.
+/// Purpose of the panel, shown while it is empty.
 const PURPOSE: &str = Pane::Notes.about().help;
 
 /// The panel “Notes”.
@@ -30,27 +30,27 @@ impl Panel for Notes {
 
 /// Shows the list.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
-    let mut ask = |ask: Ask| out.push(Command::Notes(ask));
+    let mut emit = |command: NotesCommand| out.push(Command::Notes(command));
     let list = state.notes.list.as_deref();
     ui.horizontal(|ui| {
         if ui.button(format!("{}  ({})", PIN_NOTE.name, PIN_NOTE.keys())).clicked() {
-            ask(Ask::Pin);
+            emit(NotesCommand::Pin);
         }
         let has_notes = list.is_some_and(|list| !list.is_empty());
         let previous = ui.add_enabled(has_notes, egui::Button::new("<"));
         if previous.on_hover_text("previous note of the tour").accessible_name("previous note").clicked() {
-            ask(Ask::Tour(-1));
+            emit(NotesCommand::Tour(-1));
         }
         let next = ui.add_enabled(has_notes, egui::Button::new(">"));
         if next.on_hover_text("next note of the tour").accessible_name("next note").clicked() {
-            ask(Ask::Tour(1));
+            emit(NotesCommand::Tour(1));
         }
     });
     if let Some(note) = &state.notes.removed {
         ui.horizontal(|ui| {
             ui.label(theme::note(format!("A note at step {} was removed.", note.pin.step)));
             if ui.button("Undo").accessible_name("bring the removed note back").clicked() {
-                ask(Ask::Restore(note.id));
+                emit(NotesCommand::Restore(note.id));
             }
         });
     }
@@ -64,22 +64,29 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         Some(list) => {
             ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
                 for (place, note) in list.iter().enumerate() {
-                    show_note(ui, state, note, place, list.len(), &mut ask);
+                    show_note(ui, state, note, place, list.len(), &mut emit);
                 }
             });
         }
     }
 }
 
-fn show_note(ui: &mut Ui, state: &State, note: &Note, place: usize, count: usize, ask: &mut dyn FnMut(Ask)) {
+fn show_note(
+    ui: &mut Ui,
+    state: &State,
+    note: &Note,
+    place: usize,
+    count: usize,
+    emit: &mut dyn FnMut(NotesCommand),
+) {
     let is_at = state.notes.at == Some(note.id);
     let fill = if is_at { theme::selected() } else { theme::bar() };
     egui::Frame::new().fill(fill).corner_radius(4).inner_margin(6).show(ui, |ui| {
         ui.set_width(ui.available_width());
-        // From the right: the title gets what the buttons leave.
+        // Laid out from the right: the title gets the space that the buttons leave.
         ui.with_layout(Layout::right_to_left(Align::Center).with_main_wrap(false), |ui| {
             ui.set_height(24.0);
-            buttons(ui, note, (place, count), ask);
+            buttons(ui, note, (place, count), emit);
             ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
                 let title = format!("{}. {}", place + 1, whereabouts(state, note));
                 let words = RichText::new(title).color(theme::accent());
@@ -87,7 +94,7 @@ fn show_note(ui: &mut Ui, state: &State, note: &Note, place: usize, count: usize
                     egui::Button::new(words).frame(false).min_size(egui::vec2(24.0, 24.0)).truncate();
                 let name = format!("go to note {}: {}", place + 1, whereabouts(state, note));
                 if ui.add(button).on_hover_text(&note.made).accessible_name(name).clicked() {
-                    ask(Ask::GoTo(note.id));
+                    emit(NotesCommand::GoTo(note.id));
                 }
             });
         });
@@ -96,28 +103,28 @@ fn show_note(ui: &mut Ui, state: &State, note: &Note, place: usize, count: usize
     ui.add_space(3.0);
 }
 
-/// What can be done with a note, from the right.
-fn buttons(ui: &mut Ui, note: &Note, (place, count): (usize, usize), ask: &mut dyn FnMut(Ask)) {
+/// Shows the buttons of a note, from right to left.
+fn buttons(ui: &mut Ui, note: &Note, (place, count): (usize, usize), emit: &mut dyn FnMut(NotesCommand)) {
     let mut small = |words: &str, help: &str, is_on: bool| {
         let button = egui::Button::new(words).min_size(egui::vec2(24.0, 24.0));
         let name = format!("{help} note {}", place + 1);
         ui.add_enabled(is_on, button).on_hover_text(help).accessible_name(name).clicked()
     };
     if small("Remove", "remove", true) {
-        ask(Ask::Remove(note.id));
+        emit(NotesCommand::Remove(note.id));
     }
     if small("Edit", "edit", true) {
-        ask(Ask::Edit(note.id));
+        emit(NotesCommand::Edit(note.id));
     }
     if small("▼", "later in the tour:", place + 1 < count) {
-        ask(Ask::Move { id: note.id, place: place + 1 });
+        emit(NotesCommand::Move { id: note.id, place: place + 1 });
     }
     if small("▲", "earlier in the tour:", place > 0) {
-        ask(Ask::Move { id: note.id, place: place - 1 });
+        emit(NotesCommand::Move { id: note.id, place: place - 1 });
     }
 }
 
-/// Where a note is pinned, in words.
+/// A description of the position to which a note is pinned.
 fn whereabouts(state: &State, note: &Note) -> String {
     let pin = &note.pin;
     let targets = state.session.iter().flat_map(|session| &session.targets);
@@ -133,12 +140,12 @@ fn whereabouts(state: &State, note: &Note) -> String {
 /// Shows the window in which a note is written, while it is open.
 pub(crate) fn editor(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let Some(draft) = &state.notes.draft else { return };
-    let mut ask = |ask: Ask| out.push(Command::Notes(ask));
+    let mut emit = |command: NotesCommand| out.push(Command::Notes(command));
     let mut text = draft.text.clone();
     let modal = Modal::new(Id::unique("note")).backdrop_color(theme::shade()).show(ui.ctx(), |ui| {
         ui.set_width(460.0);
         ui.label(theme::title(&title(draft)));
-        // Taken before the field, which would make a line of it.
+        // Consumed before the field, which would insert a line break.
         let is_saved_by_key = ui.input_mut(|input| input.consume_key(Modifiers::COMMAND, Key::Enter));
         let field = TextEdit::multiline(&mut text).desired_rows(6).desired_width(f32::INFINITY);
         let field =
@@ -156,12 +163,12 @@ pub(crate) fn editor(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     });
     let (save, close) = modal.inner;
     if text != draft.text {
-        ask(Ask::Write(text));
+        emit(NotesCommand::Write(text));
     }
     if save {
-        ask(Ask::Save);
+        emit(NotesCommand::Save);
     } else if close || modal.should_close() {
-        ask(Ask::Close);
+        emit(NotesCommand::Close);
     }
 }
 

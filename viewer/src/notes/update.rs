@@ -1,4 +1,4 @@
-//! The user's commands about notes, their calls, and what the replies change.
+//! The user's commands about notes, their calls, and the replies.
 
 use sightline_api::endpoint::Call;
 use sightline_api::endpoints::{AddNote, ChangeNote, ListNotes, RemoveNote, RestoreNote};
@@ -6,18 +6,18 @@ use sightline_api::location::{AtNote, AtSession};
 use sightline_session::Cursor;
 use sightline_session::notes::{EditNote, NewNote, Note, Pin};
 
-use crate::notes::{Ask, Draft, Notes};
+use crate::notes::{Draft, Notes, NotesCommand};
 use crate::stage::Stage;
 use crate::state::State;
 use crate::state::calls::Notice;
-use crate::state::deeds::Deed;
+use crate::state::undoable::UndoableChange;
 
 impl State {
     /// Applies a command about notes.
-    pub(crate) fn ask_of_notes(&mut self, ask: Ask) {
-        match ask {
-            Ask::Pin => self.pin(),
-            Ask::Edit(id) => {
+    pub(crate) fn apply_notes_command(&mut self, command: NotesCommand) {
+        match command {
+            NotesCommand::Pin => self.pin(),
+            NotesCommand::Edit(id) => {
                 let note = self.note(id).cloned();
                 self.notes.draft = note.map(|note| Draft {
                     of: Some((note.id, note.revision)),
@@ -25,29 +25,29 @@ impl State {
                     text: note.text,
                 });
             }
-            Ask::Write(text) => {
+            NotesCommand::Write(text) => {
                 if let Some(draft) = &mut self.notes.draft {
                     draft.text = text;
                 }
             }
-            Ask::Save => self.save_note(),
-            Ask::Close => {
+            NotesCommand::Save => self.save_note(),
+            NotesCommand::Close => {
                 let draft = self.notes.draft.take().filter(|draft| draft.of.is_none());
-                self.notes.kept = draft.map(|draft| draft.text).unwrap_or_default();
+                self.notes.unsaved_text = draft.map(|draft| draft.text).unwrap_or_default();
             }
-            Ask::Remove(id) => self.remove_note(id, true),
-            // If the removal was the last deed, restoring the note takes that deed back.
-            Ask::Restore(id) => match self.undo.ends().0 {
-                Some(Deed::RemovedNote { id: last, .. }) if *last == id => self.undo_last(),
+            NotesCommand::Remove(id) => self.remove_note(id, true),
+            // If the removal was the last change, restoring the note undoes that change.
+            NotesCommand::Restore(id) => match self.undo.ends().0 {
+                Some(UndoableChange::RemovedNote { id: last, .. }) if *last == id => self.undo_last(),
                 _ => self.restore_note(id),
             },
-            Ask::Move { id, place } => {
+            NotesCommand::Move { id, place } => {
                 let Some(revision) = self.note(id).map(|note| note.revision) else { return };
                 let edit = EditNote { text: None, place: Some(place) };
                 self.change_note(id, revision, edit);
             }
-            Ask::GoTo(id) => self.go_to_note(id),
-            Ask::Tour(by) => {
+            NotesCommand::GoTo(id) => self.go_to_note(id),
+            NotesCommand::Tour(by) => {
                 if let Some(id) = self.next_of_tour(by) {
                     self.go_to_note(id);
                 }
@@ -55,15 +55,18 @@ impl State {
         }
     }
 
-    /// Removes a note. `is_deed`: the removal can be taken back, and is not itself the redoing of one.
-    pub(crate) fn remove_note(&mut self, id: u64, is_deed: bool) {
+    /// Removes a note. `is_recorded`: records the removal as a change; false when a change is being redone.
+    pub(crate) fn remove_note(&mut self, id: u64, is_recorded: bool) {
         let Some(session) = self.session.as_ref().map(|session| session.id.clone()) else { return };
         let Some(note) = self.note(id).cloned() else { return };
         let step = note.pin.step;
         let call = Call::to::<RemoveNote>(&AtNote { session: session.clone(), note: id });
         let take = move |state: &mut Self, _| {
-            if is_deed {
-                state.did_remove(&format!("the note at step {step}"), Deed::RemovedNote { id, step });
+            if is_recorded {
+                state.record_removal(
+                    &format!("the note at step {step}"),
+                    UndoableChange::RemovedNote { id, step },
+                );
             }
         };
         self.call_or::<RemoveNote>(call.at_revision(note.revision), take, move |state, _| {
@@ -81,12 +84,12 @@ impl State {
         self.call::<RestoreNote>(Call::to::<RestoreNote>(&AtNote { session, note: id }), |_, _| {});
     }
 
-    /// The note of that number.
+    /// The note with this number.
     pub fn note(&self, id: u64) -> Option<&Note> {
         self.notes.list.iter().flatten().find(|note| note.id == id)
     }
 
-    /// The notes that are pinned to a stop: to the run at the cursor, or to the stop alone.
+    /// The notes pinned to a stop: those of the selected run, and those of the stop only.
     pub fn notes_at(&self, step: usize) -> Vec<&Note> {
         let cursor = self.cursor;
         let is_here = |note: &&Note| {
@@ -98,31 +101,31 @@ impl State {
 
     /// Reads the notes of a session that is being opened.
     pub(crate) fn open_notes(&mut self, session: &str) {
-        self.notes = Notes { asked: Some(session.to_owned()), ..Notes::default() };
+        self.notes = Notes { requested_for: Some(session.to_owned()), ..Notes::default() };
         self.read_notes(session.to_owned());
     }
 
     /// Reads the notes of a session.
     pub(crate) fn read_notes(&mut self, session: String) {
         let call = Call::to::<ListNotes>(&AtSession { session: session.clone() });
-        self.call::<ListNotes>(call, move |state, list| state.took_notes(&session, list));
+        self.call::<ListNotes>(call, move |state, list| state.on_notes_reply(&session, list));
     }
 
-    /// Reads the notes again after an event that they changed.
+    /// Reads the notes again after an event about them.
     pub(crate) fn notes_changed(&mut self, session: String) {
-        if self.notes.asked.as_ref() == Some(&session) {
+        if self.notes.requested_for.as_ref() == Some(&session) {
             self.read_notes(session);
         }
     }
 
     /// Replaces the list of notes, unless another session was opened meanwhile.
-    fn took_notes(&mut self, session: &str, list: Vec<Note>) {
-        if self.notes.asked.as_deref() == Some(session) {
+    fn on_notes_reply(&mut self, session: &str, list: Vec<Note>) {
+        if self.notes.requested_for.as_deref() == Some(session) {
             self.notes.list = Some(list);
         }
     }
 
-    /// Changes a note of the revision that was read; if the server refuses that, the text is in the editor again.
+    /// Changes the note at the revision that was read; if the server refuses, reopens the text in the editor.
     fn change_note(&mut self, id: u64, revision: u64, edit: EditNote) {
         let Some(session) = self.session_id() else { return };
         let at = AtNote { session: session.clone(), note: id };
@@ -133,16 +136,16 @@ impl State {
             move |state, _| {
                 state.read_notes(session);
                 if let Some(text) = edit.text {
-                    // The next attempt changes the revision that is known then.
+                    // The next attempt changes the revision that was read by then.
                     let revision = state.note(id).map_or(revision, |note| note.revision);
-                    state.edit_again(Draft { of: Some((id, revision)), pin: Pin::default(), text });
+                    state.reopen_draft(Draft { of: Some((id, revision)), pin: Pin::default(), text });
                 }
                 Notice::Card
             },
         );
     }
 
-    /// Pins a note; if the server refuses it, the text is in the editor again.
+    /// Adds a note; if the server refuses, reopens the text in the editor.
     fn add_note(&mut self, new: NewNote) {
         let Some(session) = self.session_id() else { return };
         let call = Call::with_body::<AddNote>(&AtSession { session }, &new);
@@ -150,13 +153,13 @@ impl State {
             state.messages.note("The note is pinned; the panel Notes lists them.");
         };
         self.call_or::<AddNote>(call, take, move |state, _| {
-            state.edit_again(Draft { of: None, pin: new.pin, text: new.text });
+            state.reopen_draft(Draft { of: None, pin: new.pin, text: new.text });
             Notice::Card
         });
     }
 
-    /// Puts a draft into the editor unless another one is being written.
-    fn edit_again(&mut self, draft: Draft) {
+    /// Opens a draft in the editor unless another one is being written.
+    fn reopen_draft(&mut self, draft: Draft) {
         self.notes.draft.get_or_insert(draft);
     }
 
@@ -175,7 +178,7 @@ impl State {
             stage: target.map(|_| self.stage().word().to_owned()),
             pixel: located.filter(|_| target.is_some()),
         };
-        self.notes.draft = Some(Draft { of: None, pin, text: std::mem::take(&mut self.notes.kept) });
+        self.notes.draft = Some(Draft { of: None, pin, text: std::mem::take(&mut self.notes.unsaved_text) });
     }
 
     fn save_note(&mut self) {
@@ -220,7 +223,7 @@ impl State {
         self.notes.at = Some(id);
     }
 
-    /// The note `by` places after the last visited one; the tour begins at the first note.
+    /// The note `by` positions after the last visited one; the tour starts at the first note.
     fn next_of_tour(&self, by: isize) -> Option<u64> {
         let list = self.notes.list.as_ref().filter(|list| !list.is_empty())?;
         let at = self.notes.at.and_then(|id| list.iter().position(|note| note.id == id));

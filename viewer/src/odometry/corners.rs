@@ -1,10 +1,10 @@
-//! The corners of visual odometry on the images: where each was at the stop before, where it was matched, and its fate.
+//! The corners of visual odometry on the images: position at the previous stop, match, and outcome (fate).
 //!
 //! | mark | fate |
 //! |---|---|
-//! | dot, solid line | inlier: from its place before to its match |
+//! | dot, solid line | inlier: from its previous position to its match |
 //! | cross, dashed line | outlier |
-//! | ring, dotted line | matched, without a motion to agree with |
+//! | ring, dotted line | matched, but no motion was estimated |
 //! | square, diamond, triangle, plus, small ring | lost: out of view, no match, no stereo after, no stereo, out of range |
 
 use egui::{Color32, Pos2};
@@ -12,18 +12,18 @@ use sightline_geometry::frames::Pixel;
 use sightline_rover::visual_odometry::{Fate, OdometryCorner};
 
 use crate::command::{Layer, Mode};
-use crate::drawing::overlay::{Line, Mark, Overlay, paint_mark};
+use crate::drawing::overlay::{Mark, Overlay, StrokeStyle, paint_mark};
 use crate::drawing::view2d::Canvas;
 use crate::panels::legend::Entry;
 use crate::state::State;
 use crate::theme;
 
-/// Half the size of the mark of a corner, points.
+/// Half the size of a corner's mark, points.
 const REACH: f32 = 3.0;
-/// How near to a corner the pointer must be to read it, points.
+/// Maximum distance of the pointer from a corner to show its values, points.
 const HOVER_REACH: f32 = 8.0;
 
-/// The fates in the order of the legend.
+/// The fates, in the order of the legend.
 const FATES: [Fate; 8] = [
     Fate::Inlier,
     Fate::Outlier,
@@ -38,14 +38,14 @@ const FATES: [Fate; 8] = [
 /// An image on which corners are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum At {
-    /// The left image of the stop before.
+    /// The left image of the previous stop.
     Before,
     /// The left image of the stop.
     After,
 }
 
 impl At {
-    /// Where a corner is on the image; `None` where it has no match.
+    /// The position of a corner in the image; `None` without a match.
     fn place(self, corner: &OdometryCorner) -> Option<Pixel> {
         let [x, y] = match self {
             Self::Before => corner.before_px,
@@ -55,8 +55,8 @@ impl At {
     }
 }
 
-/// Mark, colour and word of a fate.
-fn looks(fate: Fate) -> (Mark, Color32, &'static str) {
+/// Mark, colour and label of a fate.
+fn corner_style(fate: Fate) -> (Mark, Color32, &'static str) {
     match fate {
         Fate::Inlier => (Mark::Dot, theme::inlier(), "inliers"),
         Fate::Outlier => (Mark::Cross, theme::outlier(), "outliers"),
@@ -69,25 +69,25 @@ fn looks(fate: Fate) -> (Mark, Color32, &'static str) {
     }
 }
 
-/// The legend: the fates that corners have, with their counts.
+/// The legend entries: the fates that occur, with their counts.
 pub(crate) fn entries(corners: &[OdometryCorner]) -> Vec<Entry> {
     let entry = |fate: Fate| {
         let count = corners.iter().filter(|corner| corner.fate == fate).count();
-        let (mark, colour, word) = looks(fate);
+        let (mark, colour, word) = corner_style(fate);
         (count > 0).then(|| Entry::new(Layer::Corners(fate), mark, colour, format!("{word} {count}")))
     };
     FATES.into_iter().filter_map(entry).collect()
 }
 
-/// What the legend of the page's left image lists: one entry for all corners, where the stop has odometry.
+/// The legend entry for all corners on the page's left image; `None` if the stop has no odometry.
 pub(crate) fn left_entry(state: &State) -> Option<Entry> {
     let step = state.cursor.step;
     let measured = state.odometry_on_image()?;
     let word = format!("odometry from step {}, {} inliers", step.saturating_sub(1), measured.update.inliers);
-    Some(Entry::new(Layer::Odometry, Mark::Stroke(Line::Solid), theme::inlier(), word))
+    Some(Entry::new(Layer::Odometry, Mark::Stroke(StrokeStyle::Solid), theme::inlier(), word))
 }
 
-/// The corners on the page's left image; none while their layer is hidden.
+/// The corners on the page's left image; empty while their layer is hidden.
 fn on_left_image(state: &State) -> &[OdometryCorner] {
     let is_shown = state.shows(Layer::Odometry) && state.odometry_on_image().is_some();
     let odometry = state.stop_odometry().ready().filter(|_| is_shown);
@@ -99,28 +99,28 @@ pub(crate) fn paint_left(canvas: &Canvas, state: &State) {
     paint(canvas, state, on_left_image(state), At::After);
 }
 
-/// Says what the corner under the pointer on the page's left image is.
+/// Shows a tooltip for the corner under the pointer on the page's left image.
 pub(crate) fn hover_left(canvas: &Canvas, state: &State) {
     let corners = on_left_image(state);
-    if let Some(corner) = pointed(canvas, state, corners, At::After) {
+    if let Some(corner) = hovered(canvas, state, corners, At::After) {
         ring(canvas, &corners[corner], At::After);
         canvas.response.clone().on_hover_text_at_pointer(words(&corners[corner]));
     }
 }
 
-/// Paints the corners whose fates are shown; at the stop itself with a line from where each was before.
+/// Paints the corners of visible fates; at the stop itself with a line from their previous position.
 pub(crate) fn paint(canvas: &Canvas, state: &State, corners: &[OdometryCorner], at: At) {
     let overlay = Overlay::new(&canvas.painter, &canvas.transform);
     for corner in corners.iter().filter(|corner| state.shows(Layer::Corners(corner.fate))) {
         let Some(place) = at.place(corner) else { continue };
-        let (mark, colour, _) = looks(corner.fate);
+        let (mark, colour, _) = corner_style(corner.fate);
         if at == At::After
             && let Some(before) = At::Before.place(corner)
         {
             let line = match corner.fate {
-                Fate::Inlier => Line::Solid,
-                Fate::Outlier => Line::Dashed,
-                _ => Line::Dotted,
+                Fate::Inlier => StrokeStyle::Solid,
+                Fate::Outlier => StrokeStyle::Dashed,
+                _ => StrokeStyle::Dotted,
             };
             overlay.thin_line(&[before, place], colour, line);
         }
@@ -128,15 +128,15 @@ pub(crate) fn paint(canvas: &Canvas, state: &State, corners: &[OdometryCorner], 
     }
 }
 
-/// A ring around a corner.
+/// Paints a ring around a corner.
 pub(crate) fn ring(canvas: &Canvas, corner: &OdometryCorner, at: At) {
     if let Some(place) = at.place(corner) {
         Overlay::new(&canvas.painter, &canvas.transform).mark(place, Mark::Ring, theme::accent());
     }
 }
 
-/// The corner under the pointer, by its place in the table.
-pub(crate) fn pointed(canvas: &Canvas, state: &State, corners: &[OdometryCorner], at: At) -> Option<usize> {
+/// Index of the corner under the pointer.
+pub(crate) fn hovered(canvas: &Canvas, state: &State, corners: &[OdometryCorner], at: At) -> Option<usize> {
     let pointer: Pos2 = canvas.response.hover_pos().filter(|_| state.mode == Mode::Look)?;
     let distance = |corner: &OdometryCorner| {
         let place = at.place(corner).filter(|_| state.shows(Layer::Corners(corner.fate)))?;
@@ -146,7 +146,7 @@ pub(crate) fn pointed(canvas: &Canvas, state: &State, corners: &[OdometryCorner]
     near.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(k, _)| k)
 }
 
-/// The numbers of a corner, a line each.
+/// The values of a corner, one per line.
 pub(crate) fn words(corner: &OdometryCorner) -> String {
     let [x, y] = corner.before_px;
     let mut lines = vec![format!("before at {x:.1}, {y:.1}")];

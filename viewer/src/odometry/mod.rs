@@ -1,5 +1,5 @@
-//! Visual odometry of a stop: the motion by vision against that of wheels and gyro, its gates, the slip over the stops, and the
-//! corners on the left images of the stop and the one before.
+//! Visual odometry of a stop: the measured motion against that of wheels and gyro, its gates, the slip over the stops, and
+//! the corners on the left images of the stop and the previous one.
 
 pub(crate) mod corners;
 mod motion;
@@ -9,7 +9,7 @@ mod slip;
 use sightline_api::wire::StopOdometry;
 use sightline_rover::visual_odometry::{MeasuredMotion, OdometryMode};
 
-use crate::cache::{Eye, Key, Slot};
+use crate::cache::{ImageSide, Key, Slot};
 use crate::command::Layer;
 use crate::driving::pause;
 use crate::state::State;
@@ -20,15 +20,15 @@ impl State {
         self.odometry_key().map_or(Slot::Absent, |key| self.cache.odometry(&key))
     }
 
-    /// The name of the odometry of the cursor's stop, where it has one.
+    /// The cache key of the odometry of the cursor's stop; `None` if it was not measured.
     fn odometry_key(&self) -> Option<Key> {
         let step = self.cursor.step;
         self.measured_motion(step)?;
         Some(Key::Odometry { traverse: self.traverse.as_ref()?.id.clone(), step })
     }
 
-    /// The corners of the cursor's stop with the images on which they are drawn, where a panel or a layer shows them.
-    pub(crate) fn want_odometry(&self, keys: &mut Vec<Key>) {
+    /// Adds the corners of the cursor's stop and their images, if a visible panel or a layer shows them.
+    pub(crate) fn add_odometry_items(&self, keys: &mut Vec<Key>) {
         let is_on_image = self.shows(Layer::Odometry) && self.odometry_on_image().is_some();
         if !(self.wants_odometry || is_on_image) {
             return;
@@ -39,16 +39,16 @@ impl State {
             let step = self.cursor.step;
             let camera = self.measured_motion(step).and_then(|measured| measured.camera);
             let images = step.checked_sub(1).into_iter().chain([step]);
-            keys.extend(images.filter_map(|step| self.image_key_in(step, camera, Eye::Left)));
+            keys.extend(images.filter_map(|step| self.image_key_in(step, camera, ImageSide::Left)));
         }
     }
 
-    /// The motion to the cursor's stop, where it was measured in the camera that is shown.
+    /// The motion to the cursor's stop, if it was measured in the camera that is shown.
     pub(crate) fn odometry_on_image(&self) -> Option<&MeasuredMotion> {
         self.measured_motion(self.cursor.step).filter(|measured| measured.camera == self.camera())
     }
 
-    /// Why the cursor's stop has no odometry, as a sentence that says how to get it; `None` where it has one.
+    /// Why the cursor's stop has no odometry, and how to get it; `None` if it has one.
     pub(crate) fn missing_odometry(&self) -> Option<String> {
         let step = self.cursor.step;
         if self.traverse.is_none() {

@@ -1,10 +1,10 @@
-//! The motion by vision against that of wheels and gyro, axis by axis.
+//! The motion by visual odometry against that of wheels and gyro, axis by axis.
 //!
 //! ```text
 //! p = −Rᵀ t,  Σ_p = Rᵀ Σ_τ R,  Σ_θ = Rᵀ Σ_ω R      (R, t) = after_from_before
 //! ```
-//! Both motions are in the rover frame of the stop before: x ahead, y to the right, z down. The covariance of the update is that of
-//! a small motion (τ, ω) in the rover frame after, so that it is turned back.
+//! Both motions are in the rover frame of the previous stop: x ahead, y to the right, z down. The covariance of the update
+//! is that of a small motion (τ, ω) in the rover frame after the motion, so that it is rotated back.
 
 use egui::{Grid, Ui};
 use nalgebra::Matrix3;
@@ -16,13 +16,13 @@ use crate::theme;
 /// One axis of the motion, cm or degrees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Axis {
-    /// What it is, with its unit.
+    /// Name and unit.
     pub(super) name: &'static str,
-    /// By vision; `None` without a motion.
+    /// By visual odometry; `None` if it estimated no motion.
     pub(super) vision: Option<f64>,
     /// By wheels and gyro.
     pub(super) wheels: f64,
-    /// 1σ of the motion by vision.
+    /// 1σ of the motion by visual odometry; `None` without a motion.
     pub(super) sigma: Option<f64>,
 }
 
@@ -71,7 +71,7 @@ pub(super) fn show(ui: &mut Ui, axes: &[Axis; 6]) {
             ui.label(theme::label(axis.name).size(12.0));
             let digits = if axis.name.ends_with("cm") { 2 } else { 3 };
             let number = |value: Option<f64>| match value {
-                // Without the sign of a zero.
+                // Without the sign of a rounded zero.
                 Some(value) if value.abs() < 0.5 * 0.1_f64.powi(digits as i32) => format!("{:.digits$}", 0.0),
                 Some(value) => format!("{value:+.digits$}"),
                 None => "–".to_owned(),
@@ -93,7 +93,7 @@ mod tests {
 
     #[test]
     fn the_axes_are_those_of_the_frame_before_with_turned_deviations() {
-        // 50 cm by the wheels along x, of which a fifth is lost; a turn of 90° to the right by vision.
+        // 50 cm by the wheels along x, of which a fifth is slip; a turn of 90° to the right by visual odometry.
         let before = Pose::translation(3.0, 1.0, 0.0);
         let [ahead, right, .., yaw] = axes(&measured(&before, 0.2, 90.0, true), &before);
         assert!(
@@ -102,7 +102,7 @@ mod tests {
         );
         assert!(right.vision.unwrap().abs() < 1e-9 && right.wheels.abs() < 1e-9, "{right:?}");
         assert!((yaw.vision.unwrap() - 90.0).abs() < 1e-9 && yaw.wheels.abs() < 1e-9, "{yaw:?}");
-        // 3 mm along x of the frame after, which is y of the frame before.
+        // 3 mm along x of the frame after the motion, which is y of the frame before it.
         assert!((right.sigma.unwrap() - 0.3).abs() < 1e-9 && (ahead.sigma.unwrap() - 0.1).abs() < 1e-9);
     }
 }

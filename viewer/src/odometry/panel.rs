@@ -7,7 +7,7 @@ use sightline_vision::image::PixelRect;
 
 use super::corners::{self, At};
 use super::{motion, slip};
-use crate::cache::{Eye, Slot};
+use crate::cache::{ImageSide, Slot};
 use crate::command::Command;
 use crate::drawing::view2d::{Canvas, View2d};
 use crate::panels::pane::Need;
@@ -16,11 +16,11 @@ use crate::panels::{digits, gates, legend};
 use crate::state::State;
 use crate::theme;
 
-/// From this width on tables and plots are side by side, points.
+/// Width from which tables and plots are side by side, points.
 const TWO_COLUMNS: f32 = 640.0;
 /// Height of the line above an image, points.
 const CAPTION: f32 = 16.0;
-/// Between the two images, points.
+/// Gap between the two images, points.
 const GAP: f32 = 4.0;
 
 /// The panel “Odometry”.
@@ -64,7 +64,7 @@ fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     });
 }
 
-/// Whether the update is used, and how far wheels and vision disagree.
+/// Shows whether the update is used, and the disagreement of wheels and vision.
 fn verdict(ui: &mut Ui, step: usize, measured: &MeasuredMotion) {
     let (word, colour, sentence) = match (measured.update.refusal(), measured.corrects) {
         (Some(refusal), _) => (
@@ -96,7 +96,7 @@ fn verdict(ui: &mut Ui, step: usize, measured: &MeasuredMotion) {
     }
 }
 
-/// How far the motions by vision and wheels are apart, and the slip.
+/// The difference of the motions by vision and by wheels, and the slip.
 fn disagreement(measured: &MeasuredMotion) -> Option<String> {
     let update = &measured.update;
     let seen = update.after_from_before?.to_pose().inverse().translation.vector;
@@ -114,7 +114,7 @@ fn disagreement(measured: &MeasuredMotion) -> Option<String> {
     })
 }
 
-/// The legend, then the corners on the left images of both stops.
+/// Shows the legend, then the corners on the left images of both stops.
 fn images(ui: &mut Ui, state: &State, camera: Option<CameraName>, most: f32, out: &mut Vec<Command>) {
     let corners: &[OdometryCorner] = match state.stop_odometry() {
         Slot::Ready(odometry) => {
@@ -149,23 +149,23 @@ fn images(ui: &mut Ui, state: &State, camera: Option<CameraName>, most: f32, out
     for (at, canvas) in shown() {
         corners::paint(canvas, state, corners, at);
     }
-    let pointed = shown().find_map(|(at, canvas)| {
-        Some((corners::pointed(canvas, state, corners, at)?, canvas.response.clone()))
+    let hovered = shown().find_map(|(at, canvas)| {
+        Some((corners::hovered(canvas, state, corners, at)?, canvas.response.clone()))
     });
-    if let Some((corner, response)) = pointed {
+    if let Some((corner, response)) = hovered {
         shown().for_each(|(at, canvas)| corners::ring(canvas, &corners[corner], at));
         response.on_hover_text_at_pointer(corners::words(&corners[corner]));
     }
 }
 
-/// Width and height of the left image of a camera, pixels.
+/// Width and height of the left image of a camera, px.
 fn size(state: &State, camera: Option<CameraName>) -> [u32; 2] {
     let further = camera.and_then(|name| state.further_camera(state.cursor.step, name));
     let size = further.map(|camera| camera.left_size).or_else(|| state.stop().map(|stop| stop.left_size));
     size.unwrap_or([1, 1])
 }
 
-/// The left image of a stop under its caption; `None` until it is here.
+/// Shows the left image of a stop below its caption; `None` until it is loaded.
 fn image(
     ui: &mut Ui,
     state: &State,
@@ -177,7 +177,7 @@ fn image(
     let of_camera = camera.map(|name| format!(", camera {name}")).unwrap_or_default();
     let caption = format!("{caption} {step}{of_camera}");
     ui.add_sized([area.width(), CAPTION], Label::new(theme::note(&caption)).truncate());
-    let key = state.image_key_in(step, camera, Eye::Left)?;
+    let key = state.image_key_in(step, camera, ImageSide::Left)?;
     match state.cache.raster(&key) {
         Slot::Ready(raster) => {
             raster.stretch(state.stretch);
@@ -200,7 +200,7 @@ fn image(
     }
 }
 
-/// The motion, axis by axis.
+/// Shows the motion, axis by axis.
 fn numbers(ui: &mut Ui, state: &State, measured: &MeasuredMotion) {
     let stops = state.traverse.as_ref().map(|traverse| &traverse.stops);
     let before = state.cursor.step.checked_sub(1).and_then(|before| stops?.get(before));

@@ -5,22 +5,22 @@ use egui_plot::{HLine, Line, Plot, PlotPoint, PlotUi, Points, VLine};
 
 use crate::command::{Command, Go};
 use crate::drawing::overlay::{self, Mark};
-use crate::panels::chart::{few_marks, over_steps, pieces, plain, shape};
-use crate::panels::names;
+use crate::panels::chart::{few_marks, over_steps, plain, polylines, shape};
+use crate::panels::chart_legend;
 use crate::state::State;
 use crate::theme;
 
 /// Height of the plot, points.
 const HEIGHT: f32 = 110.0;
 
-/// Shows the slip along and across the motion of the wheels, percent of it.
+/// Shows the slip along and across the motion by the wheels, in percent of that motion.
 pub(super) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let lines = [
         (Mark::Ring, theme::run(0), "along the motion".to_owned()),
         (Mark::Square, theme::run(1), "to the right".to_owned()),
-        (Mark::Stroke(overlay::Line::Solid), theme::accent(), "this step".to_owned()),
+        (Mark::Stroke(overlay::StrokeStyle::Solid), theme::accent(), "this step".to_owned()),
     ];
-    names::wrapped(ui, "slip, % of the wheels’ motion", &lines);
+    chart_legend::wrapped(ui, "slip, % of the wheels’ motion", &lines);
     let last = state.stop_count().saturating_sub(1) as f64;
     let [along, aside] = series(state);
     let plot = over_steps(Plot::new("slip"), last, true)
@@ -46,7 +46,7 @@ pub(super) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     }
 }
 
-/// Slip along and across, percent, at every stop; missing where it was not measured or refused.
+/// Slip along and across, percent, at every stop; `None` where it was not measured or was refused.
 fn series(state: &State) -> [Vec<Option<[f64; 2]>>; 2] {
     let slips: Vec<_> = (0..state.stop_count())
         .map(|step| {
@@ -60,14 +60,14 @@ fn series(state: &State) -> [Vec<Option<[f64; 2]>>; 2] {
 }
 
 fn curve(plot: &mut PlotUi<'_>, points: &[Option<[f64; 2]>], (colour, mark): (egui::Color32, Mark)) {
-    for piece in pieces(points) {
-        plot.line(Line::new("", piece).color(colour).width(1.5).allow_hover(false));
+    for polyline in polylines(points) {
+        plot.line(Line::new("", polyline).color(colour).width(1.5).allow_hover(false));
     }
     let points: Vec<[f64; 2]> = points.iter().copied().flatten().collect();
     plot.points(Points::new("", points).color(colour).radius(3.0).shape(shape(mark)));
 }
 
-/// The plot in words.
+/// A description of the plot.
 fn words(along: &[Option<[f64; 2]>]) -> String {
     let known: Vec<f64> = along.iter().flatten().map(|point| point[1]).collect();
     let range = known.iter().fold(None, |range: Option<[f64; 2]>, &value| {

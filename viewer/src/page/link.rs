@@ -1,23 +1,23 @@
-//! The page's address: what is looked at, in the fragment, so that a link opens the same again.
+//! The page's address: the fragment describes the view, so that a link restores it.
 //!
 //! `#v=1&session=s1&tg=0&run=1&step=12&stage=judge&lay=match&L=512.5,300.2,8&off=truth`
 //!
 //! | key | meaning |
 //! |---|---|
-//! | `v` | version of this form |
+//! | `v` | version of the format |
 //! | `session` | the session |
 //! | `tg`, `run`, `step` | the cursor: target, run, stop |
-//! | `stage` | the stage that is looked at |
+//! | `stage` | the selected stage |
 //! | `lay` | the arrangement of the panels |
-//! | `cam` | the camera of the stops whose images are shown, `-` for the main pair; left out: that of the target |
-//! | `vs` | the runs it is compared with, `target.run` each, commas between |
+//! | `cam` | the camera whose images are shown, `-` for the main pair; omitted: that of the target |
+//! | `vs` | the runs compared with it, `target.run` each, separated by commas |
 //! | `cmp` | how the left image shows them |
-//! | `sort`, `show` | the metric by which the table of runs is sorted (`-` first: the largest comes first), and the words
-//! that the runs in it must have |
-//! | `L`, `R` | centre (px) and magnification of the left and right image; left out where the whole image is shown |
+//! | `sort` | the metric by which the table of runs is sorted; with a leading `-` in descending order |
+//! | `show` | the filter of the table of runs |
+//! | `L`, `R` | centre (px) and magnification of the left and right image; omitted if the whole image is shown |
 //!
-//! Keys that this version does not know are kept as they are. A key whose value cannot be read is left out, and a
-//! sentence says so; nothing else of the link is lost by it.
+//! Keys that this version does not know are preserved. A key with an invalid value is dropped and reported; the rest of
+//! the link is used.
 
 use sightline_geometry::camera::CameraName;
 use sightline_geometry::frames::Pixel;
@@ -28,19 +28,19 @@ use crate::compare;
 use crate::drawing::view2d::View2d;
 use crate::layout::presets::Preset;
 
-/// The version of the form.
+/// The version of the format.
 const VERSION: &str = "1";
 
 /// The main pair of cameras; no camera has this name.
 const MAIN: &str = "-";
 
-/// Longer fragments are cut: nobody's link is that long.
+/// Longer fragments are truncated.
 const LONGEST: usize = 4_096;
 
-/// The longest words by which the runs of the table are chosen, letters.
+/// Maximum length of the filter of the table of runs, characters.
 const WORDS_MAX: usize = 120;
 
-/// What a link says.
+/// The contents of a link.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Fragment {
     /// The session.
@@ -55,28 +55,28 @@ pub struct Fragment {
     pub stage: Option<Stage>,
     /// The arrangement of the panels.
     pub preset: Option<Preset>,
-    /// The camera whose images are shown, where it is not that of the target.
+    /// The camera whose images are shown; `None`: that of the target; `Some(None)`: the main pair.
     pub camera: Option<Option<CameraName>>,
-    /// The runs it is compared with.
+    /// The runs compared with it.
     pub others: Vec<RunName>,
-    /// How the left image shows them; none shows their marks.
+    /// How the left image shows them; `None` shows their marks.
     pub compared: Option<compare::View>,
-    /// How the table of runs is sorted; none leaves the runs in their own order.
+    /// The sort order of the table of runs; `None` keeps their order.
     pub sort: Option<compare::Sort>,
-    /// The words that the runs of the table must have; none shows all.
+    /// The filter of the table of runs; `None` shows all.
     pub filter: Option<String>,
     /// The view of the left image.
     pub left: Option<View2d>,
     /// The view of the right image.
     pub right: Option<View2d>,
-    /// What this version does not know, as it came.
+    /// Parts with unknown keys, unchanged.
     pub unknown: Vec<String>,
-    /// Parts that cannot be read.
+    /// Parts with invalid values.
     pub damaged: Vec<String>,
 }
 
 impl Fragment {
-    /// What an address says after its `#`.
+    /// Parses the part of an address after its `#`.
     pub fn parse(text: &str) -> Self {
         let mut link = Self::default();
         let text: String = text.trim_start_matches('#').chars().take(LONGEST).collect();
@@ -89,7 +89,7 @@ impl Fragment {
         link
     }
 
-    /// Takes one part; whether its value could be read.
+    /// Stores one part. Returns whether its value is valid.
     fn take(&mut self, key: &str, value: &str) -> bool {
         match key {
             "v" => value == VERSION,
@@ -115,7 +115,7 @@ impl Fragment {
         }
     }
 
-    /// The fragment without its `#`; empty where nothing is open.
+    /// The fragment without its `#`; empty if no session is open.
     pub fn text(&self) -> String {
         let Some(session) = &self.session else { return String::new() };
         let mut parts = vec![format!("v={VERSION}"), format!("session={session}")];
@@ -144,8 +144,8 @@ impl Fragment {
         parts.join("&")
     }
 
-    /// Whether going from `before` to here is a place of its own in the browser's history: another session, target
-    /// or run. Steps, stages and views replace what is there, so that Back does not undo a drive stop by stop.
+    /// Whether going from `before` to here adds an entry to the browser's history: another session, target or run. Steps,
+    /// stages and views replace the current entry, so that Back does not undo a drive stop by stop.
     #[cfg(any(test, target_arch = "wasm32"))]
     pub(crate) fn is_another_place(&self, before: &Self) -> bool {
         let place = |link: &Self| (link.session.clone(), link.target, link.run);
@@ -153,18 +153,18 @@ impl Fragment {
     }
 }
 
-/// Puts a value where it belongs; whether there was one.
+/// Stores a value. Returns whether there is one.
 fn put<T>(place: &mut Option<T>, value: Option<T>) -> bool {
     *place = value;
     place.is_some()
 }
 
-/// A camera: a name, or the word of the main pair.
+/// Parses a camera: a name, or `-` for the main pair.
 fn camera(value: &str) -> Option<Option<CameraName>> {
     if value == MAIN { Some(None) } else { value.parse().ok().map(Some) }
 }
 
-/// Compared runs: `0.1,0.2`.
+/// Parses compared runs: `0.1,0.2`.
 fn runs(value: &str) -> Option<Vec<RunName>> {
     let name = |text: &str| {
         let (target, run) = text.split_once('.')?;
@@ -174,14 +174,14 @@ fn runs(value: &str) -> Option<Vec<RunName>> {
     (names.len() < RUNS_MAX).then_some(names)
 }
 
-/// How the table of runs is sorted: `-ade_px`.
+/// Parses the sort order of the table of runs: `-ade_px`.
 fn sort(value: &str) -> Option<compare::Sort> {
     let (metric, is_descending) = value.strip_prefix('-').map_or((value, false), |metric| (metric, true));
     let is_known = compare::METRICS.iter().any(|(name, ..)| *name == metric);
     is_known.then(|| compare::Sort { metric: Some(metric.to_owned()), is_descending })
 }
 
-/// Words as a part of an address: all but letters, digits, `.`, `_` and `-` of ASCII as percent signs and digits.
+/// Percent-encodes text, except ASCII letters, digits, `.`, `_` and `-`.
 fn escaped(words: &str) -> String {
     let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || matches!(byte, b'.' | b'_' | b'-');
     let escape =
@@ -189,7 +189,7 @@ fn escaped(words: &str) -> String {
     words.chars().take(WORDS_MAX).collect::<String>().bytes().map(escape).collect()
 }
 
-/// Such a part as words; none where it is no text, or a long one.
+/// Decodes percent-encoded text; `None` if it is invalid, empty or too long.
 fn unescaped(value: &str) -> Option<String> {
     let mut bytes = Vec::new();
     let mut rest = value.bytes();
@@ -215,7 +215,7 @@ fn is_name(id: &str) -> bool {
     !id.is_empty() && id.len() <= 64 && id.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_')
 }
 
-/// `x,y,scale`, px and points per px.
+/// Parses `x,y,scale`, px and points per px.
 fn view(value: &str) -> Option<View2d> {
     let numbers: Vec<f64> = value.split(',').map(|number| number.parse().ok()).collect::<Option<_>>()?;
     match numbers[..] {
@@ -256,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_read_is_named_and_takes_nothing_else_with_it() {
+    fn damaged_parts_are_listed_and_the_rest_is_kept() {
         let link = Fragment::parse("#session=s1&step=-4&stage=dance&L=1,2&run=1&lay=&v=2");
         assert_eq!((link.session.as_deref(), link.run, link.step), (Some("s1"), Some(1), None));
         assert_eq!(link.damaged, ["step=-4", "stage=dance", "L=1,2", "lay=", "v=2"]);

@@ -1,12 +1,12 @@
-//! The page around the panels: its address, the browser's storage, and what a test in a browser reads.
+//! The page around the panels: its address, the browser's storage, and a status for browser tests.
 //!
 //! | file | contents |
 //! |---|---|
 //! | `link` | the fragment of the address: session, target, run, step, arrangement |
-//! | `storage` | what the browser keeps across reloads: arrangement, colours, keys |
+//! | `storage` | settings stored across reloads: arrangement, colours, stretch, keys |
 //! | `status` | the machine-readable status of the page |
-//! | `start` | the way in from the browser |
-//! | `web` | the calls into the browser |
+//! | `start` | the entry point in the browser |
+//! | `web` | calls to the browser |
 
 pub(crate) mod storage;
 #[cfg(target_arch = "wasm32")]

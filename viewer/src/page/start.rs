@@ -1,4 +1,4 @@
-//! The way in from the browser: `start` puts the application on a canvas, and a panic becomes a sentence on the page.
+//! The entry point in the browser: `start` runs the application on a canvas, and a panic becomes a sentence on the page.
 
 use std::sync::Once;
 
@@ -10,13 +10,13 @@ use crate::app::{Link, SightlineApp};
 use crate::page::link::Fragment;
 use crate::page::web;
 
-/// The event that tells the page of a panic; its detail is the panic's message.
+/// The event that reports a panic to the page; its detail is the panic's message.
 const PANIC_EVENT: &str = "sightline-panic";
 
 /// Starts the application on the canvas with this id.
 ///
 /// # Errors
-/// When the page has no such canvas, or the browser gives it no WebGL context.
+/// If the page has no such canvas, or the browser provides no WebGL context.
 #[wasm_bindgen]
 pub async fn start(canvas_id: String) -> Result<(), JsValue> {
     static HOOK: Once = Once::new();
@@ -41,7 +41,7 @@ pub async fn start(canvas_id: String) -> Result<(), JsValue> {
         .await
 }
 
-/// The server that sent the page, and what its fragment says. Behind a reverse proxy the page may be in a folder, which
+/// The address of the server, and the contents of the fragment. Behind a reverse proxy the page may be in a folder, which
 /// is part of the server's address.
 fn link() -> Link {
     let location = web_sys::window().map(|window| window.location());
@@ -51,7 +51,7 @@ fn link() -> Link {
     Link { origin, fragment: Fragment::parse(&web::hash()) }
 }
 
-/// Wakes the page when its address changes: by Back, or by hand.
+/// Repaints the page when its address changes, by Back or by editing.
 fn watch_address(context: &egui::Context) {
     let context = context.clone();
     let changed = Closure::<dyn FnMut()>::new(move || context.request_repaint());
@@ -72,7 +72,7 @@ fn report_panics_to_the_page() {
         details.set_detail(&JsValue::from_str(&panic.to_string()));
         let event = web_sys::CustomEvent::new_with_event_init_dict(PANIC_EVENT, &details);
         if let (Some(window), Ok(event)) = (web_sys::window(), event) {
-            // Nothing is left to do where the page itself cannot be told.
+            // If the event cannot be dispatched, there is no other way to report.
             window.dispatch_event(&event).unwrap_or_default();
         }
     }));

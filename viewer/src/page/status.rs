@@ -1,4 +1,4 @@
-//! A small machine-readable status, so that a test in a browser knows what is shown and where to click.
+//! A machine-readable status, from which a browser test reads what is shown and where to click.
 //!
 //! In the browser it is the attribute `data-status` of the canvas, written whenever it changes:
 //!
@@ -7,30 +7,30 @@
 //!   "phase": "ready",              // "starting", "opening" (no traverse yet) or "ready"
 //!   "connection": "live",          // "connecting", "live" or "gone"
 //!   "traverse": "name", "session": "id",
-//!   "step": 3, "stop_count": 17,   // the cursor and how many stops there are
-//!   "target": 0, "run": 0,         // numbers as in the interface's paths; target is null without one
-//!   "targets": 1,                  // how many there are
-//!   "state": "tracking",           // of the cursor's step: tracking, lost, failed; null where not computed
-//!   "steps_done": 17,              // of the run that is looked at
+//!   "step": 3, "stop_count": 17,   // the cursor's step, and the number of stops
+//!   "target": 0, "run": 0,         // numbers as in the API's paths; target is null without one
+//!   "targets": 1,                  // number of targets
+//!   "state": "tracking",           // of the cursor's step: tracking, lost, failed; null if not computed
+//!   "steps_done": 17,              // of the selected run
 //!   "running": false,              // whether that run is still being computed
-//!   "shown": true,                 // whether the step's record and left image are on the screen
-//!   "complete": true,              // whether all else of it is here, too, or was refused: the right image, the arrays
+//!   "shown": true,                 // whether the left image and, if the step is computed, its record are shown
+//!   "complete": true,              // whether the rest of the step (right image, arrays) is loaded or was refused
 //!   "stage": "match_template",
 //!   "left_image_rect": [x, y, w, h],           // of the panel's image area, CSS px from the canvas' corner
 //!   "left_image_size": [w, h],                 // of the image, px
 //!   "image_to_screen": {"scale": s, "origin": [x, y]},
 //!   "pick_mode": false,
-//!   "designating": false,          // whether a designation waits for its answer
-//!   "advised_against": false,      // whether the place that was picked is a bad one and was not tried
-//!   "drive": "waits",              // "drives", "waits", or why the drive on commands ended; null without one
-//!   "paused_before": "judge",      // the first stage that is not computed at the stop where the drive waits; null while it drives
-//!   "playing": 0,                  // how many times the rate; negative backwards, 0 paused
-//!   "breakpoints": 1, "hits": 4,   // how many there are, and their hits in all runs
-//!   "problem": "sentence or null"  // the newest message, where that is a problem
+//!   "designating": false,          // whether a designation waits for the server's reply
+//!   "advised_against": false,      // whether the picked place is a bad one and was not tried
+//!   "drive": "waits",              // "drives", "waits", or why the commanded drive ended; null without one
+//!   "paused_before": "judge",      // first stage not computed at the stop where the drive is paused; else null
+//!   "playing": 0,                  // multiple of the playback rate; negative backwards, 0 paused
+//!   "breakpoints": 1, "hits": 4,   // number of breakpoints, and of their hits in all runs
+//!   "problem": "sentence or null"  // the newest message if it is a problem
 //! }
 //! ```
-//! An image pixel (u, v), (0, 0) being the centre of the first pixel, lies on the canvas at
-//! `origin + scale · (u, v)`, in CSS px; it is visible where that falls inside `left_image_rect`.
+//! An image pixel (u, v), with (0, 0) at the centre of the first pixel, is on the canvas at `origin + scale · (u, v)`, in
+//! CSS px; it is visible if that is inside `left_image_rect`.
 
 use serde_json::{Value, json};
 use sightline_geometry::frames::Pixel;
@@ -41,7 +41,7 @@ use crate::net::events::Connection;
 use crate::state::State;
 use crate::state::messages::Weight;
 
-/// Writes the status where it changed.
+/// Writes the status when it changes.
 #[derive(Default)]
 pub(crate) struct Publisher {
     published: String,
@@ -49,7 +49,7 @@ pub(crate) struct Publisher {
 }
 
 impl Publisher {
-    /// Publishes the status if it differs from the last one; `zoom` is egui's own zoom of the whole page.
+    /// Publishes the status if it differs from the last one; `zoom` is egui's zoom factor of the whole page.
     pub(crate) fn publish(&mut self, state: &State, left_image: &LeftImage, zoom: f32) {
         let text = describe(state, left_image, zoom).to_string();
         if text != self.published {
@@ -66,7 +66,7 @@ impl Publisher {
     }
 }
 
-/// Where the cursor is and what is known there, as a screen reader speaks it.
+/// The cursor's step and its results, as spoken by a screen reader.
 pub(crate) fn sentence(state: &State) -> String {
     let Some(last) = state.stop_count().checked_sub(1) else { return state.missing_target() };
     let mut words = format!("step {} of {last}", state.cursor.step);
@@ -85,7 +85,7 @@ pub(crate) fn sentence(state: &State) -> String {
     words
 }
 
-/// The status as a document.
+/// The status as JSON.
 pub(crate) fn describe(state: &State, left_image: &LeftImage, zoom: f32) -> Value {
     let phase = match (&state.traverse, &state.traverses) {
         (Some(_), _) if state.session.is_some() => "ready",
@@ -119,9 +119,9 @@ pub(crate) fn describe(state: &State, left_image: &LeftImage, zoom: f32) -> Valu
         "advised_against": state.refusal.as_ref().is_some_and(|refusal| refusal.is_advice),
         "drive": state.drive_word(),
         "paused_before": state.drive().and_then(|drive| drive.paused).map(|halt| halt.before.word()),
-        "playing": state.ask.play.speed,
-        "breakpoints": state.ask.breakpoints.len(),
-        "hits": state.ask.breakpoints.iter().map(|breakpoint| breakpoint.count).sum::<usize>(),
+        "playing": state.breakpoints.play.speed,
+        "breakpoints": state.breakpoints.list.len(),
+        "hits": state.breakpoints.list.iter().map(|breakpoint| breakpoint.count).sum::<usize>(),
         "problem": problem.map(|message| &message.text),
         "left_image_rect": null,
         "left_image_size": null,

@@ -1,4 +1,4 @@
-//! The calls into the browser: address, storage, files, and the attributes of the canvas.
+//! Calls to the browser: address, storage, files, and the attributes of the canvas.
 
 use std::cell::RefCell;
 use std::sync::OnceLock;
@@ -6,22 +6,22 @@ use std::sync::OnceLock;
 use sightline_api::wire::Problem;
 use wasm_bindgen::prelude::*;
 
-/// The canvas on which the application runs.
+/// The id of the canvas on which the application runs.
 static CANVAS: OnceLock<String> = OnceLock::new();
 
-/// Keeps the id of the canvas on which the application runs.
+/// Stores the id of the canvas on which the application runs.
 pub(crate) fn keep_canvas(id: String) {
     CANVAS.get_or_init(|| id);
 }
 
-/// How long a change waits until it is written into the address, ms: browsers take some milliseconds for it, which a
-/// person who steps quickly would wait for.
+/// Delay before a change is written to the address, ms: writing takes a browser some milliseconds, which would slow down
+/// fast stepping.
 const LINK_DELAY_MS: i32 = 250;
 
-/// What is to be written into the address.
+/// A fragment that waits to be written to the address.
 struct LateLink {
     fragment: String,
-    /// What the address had after its `#` when this was asked for.
+    /// The fragment of the address when the write was requested.
     in_place_of: String,
 }
 
@@ -29,7 +29,7 @@ thread_local! {
     static LATE_LINK: RefCell<Option<LateLink>> = const { RefCell::new(None) };
 }
 
-/// What the address has after its `#`, or will have as soon as it is written.
+/// The current fragment of the address, or the one that waits to be written.
 pub(crate) fn hash() -> String {
     let written = written_hash();
     LATE_LINK.with_borrow(|late| match late {
@@ -43,8 +43,8 @@ fn written_hash() -> String {
     location.and_then(|location| location.hash().ok()).unwrap_or_default().trim_start_matches('#').to_owned()
 }
 
-/// Writes what is looked at into the page's address: at once as a new place of the browser's history, or soon in place of
-/// the present one.
+/// Writes the fragment to the page's address: immediately as a new entry of the browser's history, or after a delay in
+/// place of the current entry.
 pub(crate) fn keep_link(fragment: &str, is_another_place: bool) {
     if is_another_place {
         write_late_link();
@@ -63,7 +63,7 @@ pub(crate) fn keep_link(fragment: &str, is_another_place: bool) {
     }
 }
 
-/// Writes what waits, unless the person has gone to another address since.
+/// Writes the waiting fragment, unless the user has changed the address in the meantime.
 fn write_late_link() {
     if let Some(late) = LATE_LINK.take().filter(|late| late.in_place_of == written_hash()) {
         write_link(&late.fragment, false);
@@ -74,33 +74,33 @@ fn write_link(fragment: &str, is_another_place: bool) {
     let history = web_sys::window().and_then(|window| window.history().ok());
     if let Some(history) = history {
         let url = format!("#{fragment}");
-        let kept = if is_another_place {
+        let written = if is_another_place {
             history.push_state_with_url(&JsValue::NULL, "", Some(&url))
         } else {
             history.replace_state_with_url(&JsValue::NULL, "", Some(&url))
         };
-        // Where the browser forbids it, or has enough of it, the page works all the same.
-        kept.unwrap_or_default();
+        // If the browser forbids or limits history changes, the page works without them.
+        written.unwrap_or_default();
     }
 }
 
-/// What the browser keeps for this page under a name.
-pub(crate) fn kept(name: &str) -> Option<String> {
+/// The text that the browser stores for this page under a name.
+pub(crate) fn stored_item(name: &str) -> Option<String> {
     web_sys::window()?.local_storage().ok()??.get_item(name).ok()?
 }
 
-/// Lets the browser keep a text for this page.
-pub(crate) fn keep(name: &str, text: &str) {
+/// Stores a text for this page in the browser.
+pub(crate) fn store_item(name: &str, text: &str) {
     let storage = web_sys::window().and_then(|window| window.local_storage().ok().flatten());
     if let Some(storage) = storage {
-        // A browser that keeps nothing shows the overview the next time.
+        // If the browser does not store it, the defaults are used after a reload.
         storage.set_item(name, text).unwrap_or_default();
     }
 }
 
-/// Offers bytes to the person as a file of that name.
+/// Offers bytes to the user as a file with this name.
 pub(crate) fn download(name: &str, media_type: &str, bytes: &[u8]) {
-    // Where the browser refuses, nothing is saved, which it says itself.
+    // If the browser refuses the download, it reports that itself.
     let _ = try_download(name, media_type, bytes);
 }
 
@@ -115,7 +115,7 @@ fn try_download(name: &str, media_type: &str, bytes: &[u8]) -> Result<(), JsValu
     anchor.set_href(&url);
     anchor.set_download(name);
     anchor.click();
-    // The address lives as long as the page: some browsers save nothing when it is taken back at once.
+    // The object URL is not revoked: some browsers do not save the file if it is revoked immediately.
     Ok(())
 }
 
@@ -124,14 +124,14 @@ pub(crate) fn publish(name: &str, value: &str) {
     let document = web_sys::window().and_then(|window| window.document());
     let canvas = CANVAS.get().and_then(|id| document?.get_element_by_id(id));
     if let Some(canvas) = canvas {
-        // Only tests read it; without it the page is the same.
+        // Only tests read it; the page works without it.
         canvas.set_attribute(name, value).unwrap_or_default();
     }
 }
 
-/// Lets the person choose a file; `chosen` gets it, and is never called where none is chosen.
+/// Opens the file dialog; `chosen` receives the file, and is not called if the dialog is cancelled.
 pub(crate) fn choose_file(chosen: impl FnOnce(web_sys::File) + 'static) {
-    // Where the browser refuses, no dialog opens, and dropping a file works all the same.
+    // If the browser refuses, no dialog opens; dropping a file still works.
     let _ = try_choose_file(chosen);
 }
 
@@ -151,32 +151,32 @@ fn try_choose_file(chosen: impl FnOnce(web_sys::File) + 'static) -> Result<(), J
     Ok(())
 }
 
-/// A file of a recording that was chosen or dropped.
+/// A chosen or dropped file of a recording.
 #[derive(Clone)]
 pub(crate) struct RecordingFile {
-    /// Its path from the folder's name on; the name of a single file.
+    /// Path that starts with the folder's name; for a single file, its name.
     pub(crate) path: String,
-    /// Its contents, which the browser reads when they are sent.
+    /// The file, which the browser reads when it is sent.
     pub(crate) file: web_sys::File,
 }
 
 impl RecordingFile {
-    /// A file from the browser's dialog, or a single file.
+    /// Creates it from a file of the browser's dialog, or a single file.
     pub(crate) fn of(file: web_sys::File) -> Self {
         let path = js_sys::Reflect::get(&file, &"webkitRelativePath".into());
         let path = path.ok().and_then(|path| path.as_string()).filter(|path| !path.is_empty());
         Self { path: path.unwrap_or_else(|| file.name()), file }
     }
 
-    /// A file of a dropped folder: a pair of path and file.
+    /// Creates it from a file of a dropped folder: a pair of path and file.
     fn dropped(pair: &JsValue) -> Option<Self> {
         let pair: &js_sys::Array = pair.dyn_ref()?;
         Some(Self { path: pair.get(0).as_string()?, file: pair.get(1).dyn_into().ok()? })
     }
 }
 
-/// The event with the files of a dropped folder, which `boot.js` reads: its detail is a list of pairs of path and file, or a
-/// sentence if the folder cannot be read.
+/// The event with the files of a dropped folder, which `boot.js` reads: its detail is a list of pairs of path and file, or
+/// a sentence if the folder cannot be read.
 const FOLDER_EVENT: &str = "sightline-folder";
 
 /// Calls `found` with the files of every folder that is dropped on the page.
@@ -189,16 +189,17 @@ pub(crate) fn watch_folders(found: impl Fn(Result<Vec<RecordingFile>, String>) +
         });
     });
     if let Some(document) = web_sys::window().and_then(|window| window.document()) {
-        // Where the browser refuses, a dropped folder is refused with the advice to use the dialog.
+        // Without the listener, a dropped folder is refused with the advice to use the dialog.
         let listener = dropped.as_ref().unchecked_ref();
         document.add_event_listener_with_callback(FOLDER_EVENT, listener).unwrap_or_default();
     }
     dropped.forget();
 }
 
-/// Lets the person choose a folder, or one archive; `chosen` gets its files, and is never called where none is chosen.
+/// Opens the dialog for a folder or one archive; `chosen` receives its files, and is not called if the dialog is
+/// cancelled.
 pub(crate) fn choose_recording(is_archive: bool, chosen: impl FnOnce(Vec<RecordingFile>) + 'static) {
-    // Where the browser refuses, no dialog opens.
+    // If the browser refuses, no dialog opens.
     let _ = try_choose_recording(is_archive, chosen);
 }
 
@@ -255,7 +256,7 @@ async fn try_put_file(url: &str, file: &web_sys::File) -> Result<web_sys::Respon
     headers.set("Content-Type", "application/octet-stream")?;
     let request = web_sys::RequestInit::new();
     request.set_method("PUT");
-    // With the cookie that has the access token.
+    // Includes the cookie with the access token.
     request.set_credentials(web_sys::RequestCredentials::SameOrigin);
     request.set_headers(&headers);
     request.set_body(file);

@@ -1,4 +1,5 @@
-//! The bars: title and status at the top, stages and the newest message at the bottom, and the banner.
+//! The bars: title and status at the top; stages, progress and the newest message at the bottom; and the connection
+//! banner.
 
 use egui::scroll_area::ScrollBarVisibility;
 use egui::{Align, Button, Color32, ComboBox, Layout, Response, RichText, ScrollArea, Ui};
@@ -20,13 +21,13 @@ use crate::state::tracker::confidence_of;
 use crate::state::{State, run_letter};
 use crate::{panels, theme};
 
-/// How wide the buttons on the right are taken to be before they were laid out once, points.
+/// Assumed width of the buttons on the right before their first layout, points.
 const BUTTONS: f32 = 320.0;
 
-/// The width of the page below which its title is left out, points.
+/// Page width below which the title is omitted, points.
 const NARROW: f32 = 900.0;
 
-/// The columns of a row that the status line shows, each with its unit there and its number of decimals.
+/// The columns of a row that the status line shows, each with its display unit and number of decimals.
 const STATUS: [(&str, Unit, usize); 5] = [
     ("ncc", Unit::One, 2),
     ("inliers", Unit::One, 0),
@@ -35,17 +36,17 @@ const STATUS: [(&str, Unit, usize); 5] = [
     ("sigma_m", Unit::Centimetre, 1),
 ];
 
-/// The top bar: what is open, where the cursor is, and what can be done with the whole.
+/// The top bar: traverse, cursor and status, and the commands for the whole page.
 pub(crate) fn top(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ui.horizontal_centered(|ui| {
-        // In a narrow window the state of the target has the room.
+        // In a narrow window the target's state takes the title's space.
         if ui.available_width() >= NARROW {
             ui.label(RichText::new("Sightline").size(16.0).strong().color(theme::accent()));
             ui.separator();
         }
         traverse_choice(ui, state, out);
         ui.separator();
-        // The buttons keep their place: what is left of it can be scrolled where there is too much, as with four runs.
+        // The buttons keep their width; the status scrolls within the rest if it does not fit, as with four runs.
         let id = ui.scope_id().with("the buttons' width");
         let buttons = ui.data(|data| data.get_temp::<f32>(id)).unwrap_or(BUTTONS);
         let room = ui.available_width() - buttons - 2.0 * ui.spacing().item_spacing.x;
@@ -86,7 +87,7 @@ fn traverse_choice(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let choice = ComboBox::from_id_salt("traverse").width(170.0).selected_text(name).show_ui(ui, |ui| {
         for entry in list {
             let is_open = open.is_some_and(|traverse| traverse.id == entry.id);
-            // A drive on commands has the name of the one from which it began.
+            // A commanded drive has the name of the traverse from which it started.
             let is_only = list.iter().filter(|other| other.name == entry.name).count() == 1;
             let words = if is_only { entry.name.clone() } else { format!("{} ({})", entry.name, entry.id) };
             if panels::entry(ui, is_open, &words).clicked() {
@@ -153,7 +154,7 @@ pub(crate) fn status(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     readouts::states(ui, state);
 }
 
-/// The tracking state of a step in capitals, checked against the ground truth where there is one, and its colour.
+/// The tracking state of a step in capitals, checked against the ground truth if available, and its colour.
 pub(crate) fn state_word(tracking: TrackingState, row: &StepRow) -> (String, Color32) {
     match tracking {
         _ if row.not_searched => ("NOT SEARCHED".to_owned(), theme::weak()),
@@ -164,7 +165,7 @@ pub(crate) fn state_word(tracking: TrackingState, row: &StepRow) -> (String, Col
     }
 }
 
-/// The banner that says the server is gone.
+/// The banner shown while the server is unreachable.
 pub(crate) fn banner(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     if let Connection::Gone { attempts } = state.connection {
         ui.horizontal(|ui| {
@@ -178,7 +179,7 @@ pub(crate) fn banner(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     }
 }
 
-/// Buttons along the drive, and how far run and rendering are.
+/// The playback buttons, and the progress of runs and rendering.
 pub(crate) fn transport(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 3.0;
@@ -220,7 +221,7 @@ fn run_progress(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     }
 }
 
-/// A thin bar with its words.
+/// A thin progress bar with its label; `part` is in 0..1.
 fn progress_bar(ui: &mut Ui, words: &str, part: f64) {
     let (rect, _) = ui.allocate_exact_size(egui::vec2(90.0, 6.0), egui::Sense::hover());
     ui.painter().rect_filled(rect, 3.0, theme::unknown());
@@ -238,7 +239,7 @@ fn newest_message(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     }
 }
 
-/// The stages in running order; the steps of `locate` stand in brackets after it.
+/// The stages in execution order; the steps of `locate` follow it in brackets.
 pub(crate) fn stages(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 3.0;
@@ -297,7 +298,7 @@ fn stage_button(ui: &mut Ui, state: &State, stage: Stage, out: &mut Vec<Command>
     }
 }
 
-/// Whether a stage is where the step went wrong.
+/// Whether the step failed at this stage.
 fn has_failed(trace: Option<&RunStep>, stage: Stage) -> bool {
     let Some(trace) = trace else { return false };
     match stage {

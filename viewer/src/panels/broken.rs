@@ -1,14 +1,14 @@
-//! What stands where an image of a step cannot be shown: hatching, the file at fault, what to do, and a way to try again.
-//! Stepping goes on; only this step is hatched.
+//! The placeholder for an image of a step that cannot be shown: hatching, the file at fault, a hint, and a button to try
+//! again. Only this step is hatched; the others can still be selected.
 
 use egui::{Align, Button, Label, Layout, RichText, Stroke, Ui, UiBuilder, pos2, vec2};
 use sightline_api::wire::Problem;
 
 use crate::command::Command;
-use crate::files::Ask;
+use crate::files::FilesCommand;
 use crate::theme;
 
-/// Distance of the hatching's lines, points.
+/// Spacing of the hatching lines, points.
 const APART: f32 = 14.0;
 
 /// Fills the panel.
@@ -33,7 +33,7 @@ pub(crate) fn show(ui: &mut Ui, word: &str, step: usize, problem: &Problem, out:
         let button = Button::new("Try again").min_size(vec2(24.0, 24.0));
         let name = format!("try the {word} image of step {step} again");
         if ui.add(button).accessible_name(name).clicked() {
-            out.push(Command::Files(Ask::TryAgain));
+            out.push(Command::Files(FilesCommand::TryAgain));
         }
     });
     ui.advance_cursor_after_rect(space);

@@ -1,4 +1,4 @@
-//! The choice of the camera whose images the two image panels show, where a stop has more than its main pair.
+//! The choice of the camera whose images the two image panels show, at a stop with more than its main pair.
 
 use egui::{ComboBox, Ui};
 use sightline_geometry::camera::CameraName;
@@ -36,7 +36,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     });
 }
 
-/// A camera in words.
+/// The display name of a camera.
 pub(crate) fn word(camera: Option<CameraName>) -> String {
     camera.map_or_else(|| "main pair".to_owned(), |name| name.to_string())
 }

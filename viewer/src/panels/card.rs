@@ -1,5 +1,5 @@
-//! The card of a problem: one sentence, what to do, its code, and what helps to find it in the server's log. It stands
-//! above the panels until it is closed, and stays among the messages.
+//! The card of a problem: one sentence, a hint, its code, and details that help to find it in the server's log. It is
+//! shown above the panels until it is closed, and remains among the messages.
 
 use egui::{Align, Align2, Area, CollapsingHeader, Id, Label, Layout, Order, RichText, Ui, WidgetInfo, vec2};
 
@@ -10,10 +10,10 @@ use crate::theme;
 
 /// Width of the card, points.
 const WIDTH: f32 = 380.0;
-/// How far from the page's lower right corner it stands, points: above the timeline.
+/// Offset from the page's lower right corner, points: above the timeline.
 const AWAY: [f32; 2] = [-14.0, -130.0];
 
-/// Shows the card of the problem that was met last, until it is closed.
+/// Shows the card of the latest problem, until it is closed.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let Some(message) = state.messages.card() else { return };
     let area = Area::new(Id::unique("card of a problem")).order(Order::Foreground);
@@ -38,7 +38,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     });
 }
 
-/// A button that copies all that is known of a message.
+/// A button that copies a message with its hint, code and details.
 pub(crate) fn copy(ui: &mut Ui, message: &Message) {
     let name = format!("copy message: {}", message.text);
     let button = egui::Button::new("Copy").min_size(vec2(24.0, 24.0));
@@ -47,7 +47,7 @@ pub(crate) fn copy(ui: &mut Ui, message: &Message) {
     }
 }
 
-/// The sentence, what to do, the code and the details.
+/// The sentence, the hint, the code and the details.
 pub(crate) fn body(ui: &mut Ui, message: &Message) {
     let is_problem = message.weight == Weight::Problem;
     let colour = if is_problem { theme::lost() } else { theme::text() };

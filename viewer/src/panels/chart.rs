@@ -1,4 +1,4 @@
-//! Common parts of charts: axes over the steps, at least three round ticks, and lines broken where there is no value.
+//! Common parts of charts: axes over the steps, at least three round ticks, and lines broken at missing values.
 
 use egui::Id;
 use egui_plot::{GridInput, GridMark, MarkerShape, Plot};
@@ -7,7 +7,7 @@ use crate::drawing::decimate;
 use crate::drawing::overlay::Mark;
 use crate::theme;
 
-/// A plot over the steps, which moves with its neighbours; only the lowest one has numbers of steps.
+/// A plot over the steps, with its x axis linked to the other plots; only the lowest one is labelled with step numbers.
 pub(crate) fn over_steps<'a>(plot: Plot<'a>, last: f64, is_last: bool) -> Plot<'a> {
     plot.allow_scroll(false)
         .allow_drag(false)
@@ -23,7 +23,7 @@ pub(crate) fn over_steps<'a>(plot: Plot<'a>, last: f64, is_last: bool) -> Plot<'
         .y_axis_formatter(plain)
         .y_axis_min_width(40.0)
         .x_axis_formatter(|mark: GridMark, _: &std::ops::RangeInclusive<f64>| match mark.value {
-            // The first tick says what the axis counts.
+            // The first tick names the axis.
             0.0 => "step 0".to_owned(),
             whole if whole.fract() == 0.0 => format!("{whole}"),
             _ => String::new(),
@@ -31,7 +31,7 @@ pub(crate) fn over_steps<'a>(plot: Plot<'a>, last: f64, is_last: bool) -> Plot<'
         .link_axis(Id::unique("steps"), [true, false])
 }
 
-/// The fewest ticks at round numbers that are at least three, however low a plot is.
+/// Ticks at the coarsest round spacing that gives at least three, regardless of the plot's height.
 pub(crate) fn few_marks(input: GridInput) -> Vec<GridMark> {
     let (low, high) = input.bounds;
     let range = (high - low).max(1e-9);
@@ -42,7 +42,7 @@ pub(crate) fn few_marks(input: GridInput) -> Vec<GridMark> {
     marks(low, high, step)
 }
 
-/// Ticks at whole steps: at most eight, and at least three where the drive has as many steps.
+/// Ticks at whole steps: at most eight, and at least three if the drive has as many steps.
 fn step_marks(input: GridInput) -> Vec<GridMark> {
     let (low, high) = input.bounds;
     let rounds = (0..9).flat_map(|power| [1.0, 2.0, 5.0].map(|round| round * 10_f64.powi(power)));
@@ -55,25 +55,25 @@ fn marks(low: f64, high: f64, step: f64) -> Vec<GridMark> {
     (first..=last).map(|i| GridMark { value: i as f64 * step, step_size: high - low }).collect()
 }
 
-/// The step that a place of the x axis belongs to, if the drive has it.
+/// The step nearest to a position on the x axis; `None` outside the drive.
 pub(crate) fn step_of(x: f64, last: f64) -> Option<usize> {
     let step = x.round();
     (0.0..=last).contains(&step).then_some(step as usize)
 }
 
-/// A tick's number with the digits that it needs.
+/// A tick's number without trailing zeros.
 pub(crate) fn plain(mark: GridMark, _: &std::ops::RangeInclusive<f64>) -> String {
     format!("{}", (mark.value * 1e6).round() / 1e6)
 }
 
-/// The runs of consecutive points, each no longer than its curve needs.
-pub(crate) fn pieces(points: &[Option<[f64; 2]>]) -> Vec<Vec<[f64; 2]>> {
+/// The polylines between missing points, each decimated for drawing.
+pub(crate) fn polylines(points: &[Option<[f64; 2]>]) -> Vec<Vec<[f64; 2]>> {
     let runs = points.split(Option::is_none);
-    let pieces = runs.filter(|run| !run.is_empty()).map(|run| run.iter().copied().flatten().collect());
-    pieces.map(decimate::curve).collect()
+    let polylines = runs.filter(|run| !run.is_empty()).map(|run| run.iter().copied().flatten().collect());
+    polylines.map(decimate::curve).collect()
 }
 
-/// The plotted shape of a run's mark.
+/// The plot marker of a run.
 pub(crate) fn shape(mark: Mark) -> MarkerShape {
     match mark {
         Mark::Square => MarkerShape::Square,
@@ -122,7 +122,7 @@ mod tests {
     #[test]
     fn a_line_is_broken_where_there_is_no_value() {
         let points = [None, Some([1.0, 2.0]), Some([2.0, 3.0]), None, Some([4.0, 1.0])];
-        assert_eq!(pieces(&points), vec![vec![[1.0, 2.0], [2.0, 3.0]], vec![[4.0, 1.0]]]);
-        assert!(pieces(&[None, None]).is_empty());
+        assert_eq!(polylines(&points), vec![vec![[1.0, 2.0], [2.0, 3.0]], vec![[4.0, 1.0]]]);
+        assert!(polylines(&[None, None]).is_empty());
     }
 }

@@ -1,11 +1,12 @@
-//! The target's close-up: its surroundings in both images, four times magnified, with the marks of the step and the 3σ ellipses.
+//! The target's close-up: its surroundings in both images, magnified four times, with the marks of the step and the 3σ
+//! ellipses.
 
 use egui::{Align2, Margin, Painter, Pos2, Rect, Sense, Ui, pos2, vec2};
 use sightline_geometry::frames::Pixel;
 use sightline_session::step::RunStep;
 use sightline_vision::image::PixelRect;
 
-use crate::cache::{Eye, Slot};
+use crate::cache::{ImageSide, Slot};
 use crate::command::Command;
 use crate::drawing::overlay::{Overlay, paint_words};
 use crate::drawing::raster::Raster;
@@ -30,7 +31,7 @@ impl Panel for CloseUp {
     }
 
     fn missing(&self, state: &State) -> Option<String> {
-        let is_there = state.trace_on_image().is_some_and(|trace| place(trace, Eye::Left).is_some());
+        let is_there = state.trace_on_image().is_some_and(|trace| place(trace, ImageSide::Left).is_some());
         (!is_there).then(|| state.missing_step())
     }
 
@@ -39,37 +40,37 @@ impl Panel for CloseUp {
     }
 }
 
-/// Where the target is in an image: as it was found, else as it was predicted.
-fn place(trace: &RunStep, eye: Eye) -> Option<Pixel> {
+/// The target's pixel in an image: as located, else as predicted.
+fn place(trace: &RunStep, side: ImageSide) -> Option<Pixel> {
     let located = trace.located();
-    match eye {
-        Eye::Left => located.and_then(|found| found.left_pixel).or(trace.point_mast.predicted_left),
-        Eye::Right => located.and_then(|found| found.right_pixel).or(trace.point_mast.predicted_right),
+    match side {
+        ImageSide::Left => located.and_then(|found| found.left_pixel).or(trace.point_mast.predicted_left),
+        ImageSide::Right => located.and_then(|found| found.right_pixel).or(trace.point_mast.predicted_right),
     }
 }
 
 fn show(ui: &mut Ui, state: &State) {
     let Some(trace) = state.trace_on_image() else { return };
     let area = ui.available_rect_before_wrap();
-    let has_right = place(trace, Eye::Right).is_some() && state.lacks_image(Eye::Right).is_none();
+    let has_right = place(trace, ImageSide::Right).is_some() && state.lacks_image(ImageSide::Right).is_none();
     let width = if has_right { (area.width() - GAP) / 2.0 } else { area.width() };
     let frame = |left: f32| Rect::from_min_size(pos2(left, area.top()), vec2(width, area.height()));
-    view(ui, state, trace, Eye::Left, frame(area.left()));
+    view(ui, state, trace, ImageSide::Left, frame(area.left()));
     if has_right {
-        view(ui, state, trace, Eye::Right, frame(area.left() + width + GAP));
+        view(ui, state, trace, ImageSide::Right, frame(area.left() + width + GAP));
     }
     ui.advance_cursor_after_rect(area);
 }
 
-/// One eye's view.
-fn view(ui: &Ui, state: &State, trace: &RunStep, eye: Eye, frame: Rect) {
+/// The view of one camera.
+fn view(ui: &Ui, state: &State, trace: &RunStep, side: ImageSide, frame: Rect) {
     let painter = ui.painter_at(frame);
     painter.rect_filled(frame, 0.0, theme::well());
-    let name = format!("close-up of the {} image", eye.word());
-    let response = ui.interact(frame, ui.scope_id().with(eye.word()), Sense::hover());
+    let name = format!("close-up of the {} image", side.word());
+    let response = ui.interact(frame, ui.scope_id().with(side.word()), Sense::hover());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
-    let (Some(centre), Slot::Ready(raster)) = (place(trace, eye), state.image(eye)) else {
-        let words = format!("Loading the {} image …", eye.word());
+    let (Some(centre), Slot::Ready(raster)) = (place(trace, side), state.image(side)) else {
+        let words = format!("Loading the {} image …", side.word());
         painter.text(frame.center(), Align2::CENTER_CENTER, words, theme::image_font(), theme::weak());
         return;
     };
@@ -83,13 +84,13 @@ fn view(ui: &Ui, state: &State, trace: &RunStep, eye: Eye, frame: Rect) {
                 &Overlay::new(&painter, &transform),
                 trace,
                 state.template_side_px(),
-                eye,
+                side,
                 of,
                 state,
             );
         }
         let corner: Pos2 = frame.left_bottom() + vec2(6.0, -10.0);
-        paint_words(&painter, corner, &format!("{} ×{SCALE}", eye.word()), theme::weak());
+        paint_words(&painter, corner, &format!("{} ×{SCALE}", side.word()), theme::weak());
     });
 }
 

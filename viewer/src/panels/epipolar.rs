@@ -1,13 +1,14 @@
-//! Epipolar curves: where the points of a line of sight of one eye lie in the image of the other, with ticks at round ranges.
+//! Epipolar curves: the line of sight of one camera projected into the image of the other, with ticks at round ranges.
 //!
-//! The point of pixel p at range R is P(R) = C + R ê(p), in the rover frame, m; the other camera sees it at π(P(R)). Lenses
-//! bend the line to a curve (R73). It is sampled at equal steps of inverse range 1/R, along which disparity grows evenly.
+//! Pixel p at range R is the point P(R) = C + R ê(p), in the rover frame, m; it projects to π(P(R)) in the other camera.
+//! Lens distortion bends the line to a curve (R73). It is sampled at equal steps of inverse range 1/R, in which disparity
+//! is linear.
 
 use egui::{Color32, vec2};
 use sightline_geometry::camera::Camera;
 use sightline_geometry::frames::{Pixel, Ray};
 
-use crate::drawing::overlay::{Line, Overlay};
+use crate::drawing::overlay::{Overlay, StrokeStyle};
 use crate::drawing::view2d::Canvas;
 
 /// Ranges with a tick, m.
@@ -22,21 +23,21 @@ const SAMPLES: usize = 160;
 /// Two ticks are at least this far apart, points.
 const TICK_GAP: f32 = 34.0;
 
-/// The curve of a pixel of one eye in the image of the other.
+/// The epipolar curve of a pixel of one camera in the image of the other.
 pub(crate) struct Curve<'a> {
-    /// The line of sight; its lens is undone once and not at every range.
+    /// The line of sight; the lens distortion is removed once, not at every range.
     ray: Ray,
     to: &'a Camera,
 }
 
 impl<'a> Curve<'a> {
-    /// The curve of a pixel (px) of `from` in the image of `to`; none where the lens cannot be undone.
+    /// The curve of a pixel of `from` in the image of `to`; `None` if the lens distortion cannot be inverted.
     pub(crate) fn new(from: &Camera, to: &'a Camera, pixel: Pixel) -> Option<Self> {
         Some(Self { ray: from.ray(pixel)?, to })
     }
 
-    /// The point of the curve at a range, m, px; none behind the camera, and far outside of its image, where the model of
-    /// the lens means nothing.
+    /// The pixel of the curve at a range, m; `None` behind the camera and far outside its image, where the lens model is
+    /// not valid.
     pub(crate) fn at(&self, range_m: f64) -> Option<Pixel> {
         let pixel = self.to.project(&self.ray.at(range_m))?;
         let (width, height) = (f64::from(self.to.width()), f64::from(self.to.height()));
@@ -44,12 +45,12 @@ impl<'a> Curve<'a> {
         is_near.then_some(pixel)
     }
 
-    /// Its points with their ranges, m, the far end first.
+    /// The pixels of the curve with their ranges, m, the far end first.
     fn points(&self) -> impl Iterator<Item = (f64, Pixel)> {
         ranges().filter_map(|range_m| Some((range_m, self.at(range_m)?)))
     }
 
-    /// The range of the point nearest to a pixel, m, and how far that is away, px.
+    /// The range, m, of the curve's point nearest to a pixel, and its distance from the pixel, px.
     pub(crate) fn nearest(&self, pixel: Pixel) -> Option<(f64, f64)> {
         let points: Vec<(f64, Pixel)> = self.points().collect();
         let between = |pair: &[(f64, Pixel)]| {
@@ -63,15 +64,15 @@ impl<'a> Curve<'a> {
         points.windows(2).map(between).min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// Paints it with its ticks.
-    pub(crate) fn paint(&self, canvas: &Canvas, colour: Color32, line: Line) {
+    /// Paints the curve with its ticks.
+    pub(crate) fn paint(&self, canvas: &Canvas, colour: Color32, line: StrokeStyle) {
         let overlay = Overlay::new(&canvas.painter, &canvas.transform);
         let whole: Vec<Pixel> = self.points().map(|(_, pixel)| pixel).collect();
         overlay.line(&whole, colour, line);
         self.paint_ticks(canvas, &overlay, colour);
     }
 
-    /// Ticks across the curve with their range; where they would crowd, some are left out.
+    /// Ticks across the curve with their range; ticks that would crowd are omitted.
     pub(crate) fn paint_ticks(&self, canvas: &Canvas, overlay: &Overlay<'_>, colour: Color32) {
         let mut last: Option<egui::Pos2> = None;
         for range_m in TICKS_M {
@@ -86,7 +87,7 @@ impl<'a> Curve<'a> {
             let across = (-(beyond.y - at.y) / length, (beyond.x - at.x) / length);
             let reach = 5.0 / canvas.transform.scale;
             let ends = [-reach, reach].map(|t| at.offset(across.0 * t, across.1 * t));
-            overlay.line(&ends, colour, Line::Solid);
+            overlay.line(&ends, colour, StrokeStyle::Solid);
             overlay.words(at, vec2(-8.0, 15.0), &format!("{range_m}"), colour);
             last = Some(screen);
         }

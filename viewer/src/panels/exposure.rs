@@ -1,4 +1,4 @@
-//! The row above an image: the stretch with which it is shown, its legend, and how it was exposed where it matters.
+//! The row above an image: its contrast stretch, its legend, and its exposure.
 
 use egui::{Align, ComboBox, DragValue, Layout, RichText, Ui};
 use sightline_track::stages::capture::Capture;
@@ -13,7 +13,7 @@ use crate::{figure, panels, theme};
 /// Height of the row, points.
 const HEIGHT: f32 = 20.0;
 
-/// From this share of saturated pixels on the words stand out: the template may have lost its detail.
+/// Share of saturated pixels above which the exposure is highlighted: the template may have lost detail.
 const SATURATED_SHARE: f32 = 0.01;
 
 /// Shows the row.
@@ -73,7 +73,8 @@ fn by_hand(ui: &mut Ui, [mut brightness, mut contrast, mut gamma]: [f32; 3], out
     }
 }
 
-/// Mean level and saturated share of the exposure subframe in words, and whether too much of it is saturated.
+/// The size, mean grey value and saturated share of the exposure subframe in words, and whether too much of it is
+/// saturated.
 fn exposure(capture: &Capture) -> (String, bool) {
     let Some(size) = capture.subframe.map(|s| format!("{} × {} px", s.width, s.height)) else {
         return ("no subframe: the prediction lies outside".to_owned(), true);

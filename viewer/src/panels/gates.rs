@@ -1,4 +1,4 @@
-//! The gates: the loss criteria with value, limit and margin, and the verdict as a sentence.
+//! The gates of the current step with value, limit and margin, and the verdict as a sentence.
 
 use egui::{Align2, Rect, RichText, ScrollArea, Sense, Ui, pos2, vec2};
 use sightline_session::why::words::capitalised;
@@ -12,9 +12,9 @@ use crate::panels::panel::Panel;
 use crate::state::State;
 use crate::theme;
 
-/// Room for the margin in digits, points.
+/// Width of the margin's digits, points.
 const MARGIN: f32 = 50.0;
-/// Least widths of the columns: pass or fail, limit, value; points.
+/// Minimum widths of the columns pass or fail, limit, value; points.
 const COLUMNS: [f32; 3] = [28.0, 56.0, 38.0];
 /// Space between the columns, points.
 const SPACE: f32 = 5.0;
@@ -53,7 +53,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     });
 }
 
-/// The verdict in words, with the counter of the state machine.
+/// The verdict in words, with the transition of the state machine.
 fn sentence(ui: &mut Ui, verdict: &Verdict, state: &State) {
     let (word, colour) = match (verdict.accepted, verdict.good) {
         (true, _) => ("ACCEPTED", theme::tracking()),
@@ -69,7 +69,7 @@ fn sentence(ui: &mut Ui, verdict: &Verdict, state: &State) {
     }
 }
 
-/// The change of state, with how many retries remain.
+/// The change of state, with the number of retries left.
 fn transition(verdict: &Verdict, state: &State) -> String {
     let limits = &state.run_settings().limits;
     let retries = limits.n_retry.saturating_sub(u32::from(limits.count_detecting_update));
@@ -113,7 +113,7 @@ pub(crate) fn show_gate(ui: &mut Ui, step: usize, gate: &Gate, out: &mut Vec<Com
         ui.label(number);
         let link = ui.link(name).on_hover_text("Why? Where this margin comes from");
         let copied = gate.value.map_or_else(|| "none".to_owned(), |value| value.to_string());
-        numbers::ask(&link, step, &format!("gate.{}", gate.name), &copied, out);
+        numbers::explain_on_click(&link, step, &format!("gate.{}", gate.name), &copied, out);
     };
     let show_columns = |ui: &mut Ui| {
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
@@ -143,12 +143,12 @@ fn width_of(ui: &Ui, text: &RichText) -> f32 {
     text.into_galley(ui, Some(egui::TextWrapMode::Extend), f32::INFINITY, egui::TextStyle::Body).size().x
 }
 
-/// A number with three decimals; a count of ten or more without.
+/// A number with three decimals; whole numbers of ten or more without.
 fn digits(value: f64) -> String {
     if value.fract() == 0.0 && value.abs() >= 10.0 { format!("{value:.0}") } else { format!("{value:.3}") }
 }
 
-/// A text in a column of its own, right aligned.
+/// A text in its own column, right aligned.
 fn column(ui: &mut Ui, width: f32, text: RichText) {
     ui.allocate_ui_with_layout(vec2(width, 16.0), egui::Layout::right_to_left(egui::Align::Center), |ui| {
         ui.set_width(width);
@@ -156,7 +156,7 @@ fn column(ui: &mut Ui, width: f32, text: RichText) {
     });
 }
 
-/// A bar with the value against its limit; the good side is right of the limit for scores, else left of it.
+/// A bar with the value against its limit; passing values are right of the limit for scores, else left of it.
 fn bar(ui: &mut Ui, gate: &Gate, colour: egui::Color32) {
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), BAR + 5.0), Sense::hover());
     let rail = Rect::from_min_size(rect.min + vec2(0.0, 2.0), vec2(rect.width() - MARGIN, BAR));
@@ -189,7 +189,7 @@ pub(crate) fn readable(name: &str) -> &str {
     sightline_session::why::gates::label(name)
 }
 
-/// Name, value and limit of a gate that was not met, lengths in centimetres: `range change 25.0 > 12.0 cm`.
+/// Name, value and limit of a failed gate, lengths in centimetres: `range change 25.0 > 12.0 cm`.
 pub(crate) fn failed_words(gate: &Gate) -> String {
     let relation = if gate.at_least { "<" } else { ">" };
     let name = readable(&gate.name);
@@ -216,7 +216,7 @@ mod tests {
         assert_eq!(fractions(&gate(Some(0.05), 0.1, false)), (Some(0.25), 0.5));
         assert_eq!(fractions(&gate(Some(9.0), 0.1, false)), (Some(1.0), 0.5));
         assert_eq!(fractions(&gate(None, 0.1, false)), (None, 0.5));
-        // A ratio that must exceed one and a distance that must be kept go up to twice their limits as well.
+        // A ratio with a lower limit above one, and a distance with a lower limit, also extend to twice their limits.
         assert_eq!(fractions(&gate(Some(1.725), 1.15, true)), (Some(0.75), 0.5));
         let edge = Gate { unit: "m".to_owned(), ..gate(Some(0.004), 0.004, true) };
         assert_eq!(fractions(&edge), (Some(0.5), 0.5));

@@ -5,12 +5,13 @@ use sightline_geometry::frames::Pixel;
 use sightline_session::step::RunStep;
 use sightline_vision::image::PixelRect;
 
-use crate::cache::Eye;
+use crate::cache::ImageSide;
 use crate::command::{Command, Layer, Mode, Zoomable};
 use crate::compare::panel::marks as compared;
-use crate::drawing::overlay::{Line, Mark, Overlay};
+use crate::drawing::overlay::{Mark, Overlay, StrokeStyle};
 use crate::drawing::raster::Raster;
 use crate::drawing::view2d::Canvas;
+use crate::hovered::Hovered;
 use crate::panels::camera_choice;
 use crate::panels::epipolar::Curve;
 use crate::panels::features::marks;
@@ -20,11 +21,10 @@ use crate::panels::legend;
 use crate::panels::legend::Entry;
 use crate::panels::panel::Panel;
 use crate::panels::status_line::{STATUS, status_line};
-use crate::pointed::Pointed;
 use crate::state::{State, run_letter};
 use crate::{figure, theme};
 
-/// From how near to the curve its range is told, px.
+/// Largest distance from the curve at which the pointer shows its range, px.
 const NEAR_PX: f64 = 40.0;
 
 /// The panel of the right image.
@@ -43,7 +43,7 @@ impl Panel for RightView {
 /// Shows the right image.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     camera_choice::show(ui, state, out);
-    let Some(raster) = ready_image(ui, state, Eye::Right, out) else { return };
+    let Some(raster) = ready_image(ui, state, ImageSide::Right, out) else { return };
     raster.stretch(state.stretch);
     let entries = theme::on_image(|| entries(state));
     if figure::is_on_paper() {
@@ -54,7 +54,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     picture(ui, state, raster, out);
 }
 
-/// The image itself with its marks and the line below it.
+/// The image with its marks and the status line below it.
 fn picture(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) {
     let [width, height] = raster.size();
     let region = PixelRect::whole(width, height);
@@ -72,12 +72,12 @@ fn picture(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) 
         theme::on_image(|| paint_marks(&canvas, trace, state));
     }
     theme::on_image(|| compared::paint_right(&Overlay::new(&canvas.painter, &canvas.transform), state));
-    let pointed = paint_pointed(&canvas, state);
+    let hovered = paint_hovered(&canvas, state);
     let here = canvas.hovered(region);
-    status_line(ui, &canvas, raster, region, pointed);
+    status_line(ui, &canvas, raster, region, hovered);
     if let Some(pixel) = here {
         paint_range(&canvas, state, pixel);
-        out.push(Command::Point(Pointed::Right(pixel)));
+        out.push(Command::Hover(Hovered::Right(pixel)));
     }
     if let Some(view) = canvas.moved {
         out.push(Command::View(Zoomable::Right, view));
@@ -98,7 +98,7 @@ fn entries(state: &State) -> Vec<Entry> {
     }
     if trace.located().is_some_and(|l| l.left_pixel.is_some()) {
         let word = "epipolar curve, range in m";
-        entries.push(Entry::new(Layer::Curve, Mark::Stroke(Line::Solid), theme::search(), word));
+        entries.push(Entry::new(Layer::Curve, Mark::Stroke(StrokeStyle::Solid), theme::search(), word));
     }
     entries.extend(marks::right_entries(state));
     entries.extend(compared::entries(state));
@@ -108,10 +108,10 @@ fn entries(state: &State) -> Vec<Entry> {
 fn paint_marks(canvas: &Canvas, trace: &RunStep, state: &State) {
     let overlay = Overlay::new(&canvas.painter, &canvas.transform);
     if let Some(curve) = target_curve(state).filter(|_| state.shows(Layer::Curve)) {
-        curve.paint(canvas, theme::search(), Line::Dotted);
+        curve.paint(canvas, theme::search(), StrokeStyle::Dotted);
     }
     let run = theme::run(state.cursor.run);
-    image_marks::paint(&overlay, trace, state.template_side_px(), Eye::Right, Of::Shown(run), state);
+    image_marks::paint(&overlay, trace, state.template_side_px(), ImageSide::Right, Of::Shown(run), state);
     let stereo = trace.template().and_then(|evidence| evidence.point_stereo.as_ref());
     if let Some(stereo) = stereo.filter(|_| state.shows(Layer::Match)) {
         let words = format!("{:.2} m, ncc {:.2}", stereo.range_m, stereo.score);
@@ -123,19 +123,19 @@ fn paint_marks(canvas: &Canvas, trace: &RunStep, state: &State) {
     }
 }
 
-/// What is pointed at in another panel; what that is, in words.
-fn paint_pointed(canvas: &Canvas, state: &State) -> Option<String> {
-    let pointed = state.pointed.filter(|_| state.marks)?;
-    if let Pointed::Range(range_m) = pointed {
+/// Paints the position that the pointer selects in another panel. Returns its description.
+fn paint_hovered(canvas: &Canvas, state: &State) -> Option<String> {
+    let hovered = state.hovered.filter(|_| state.marks)?;
+    if let Hovered::Range(range_m) = hovered {
         let pixel = curve_on_image(state)?.at(range_m)?;
         let overlay = Overlay::new(&canvas.painter, &canvas.transform);
         overlay.mark(pixel, Mark::Plus, theme::accent());
         return Some(format!("range {range_m:.2} m"));
     }
-    let (pixel, (from, to)) = (pointed.left()?, state.eyes()?);
+    let (pixel, (from, to)) = (hovered.left()?, state.stereo_cameras()?);
     let curve = Curve::new(from, to, pixel)?;
-    curve.paint(canvas, theme::accent(), Line::Dashed);
-    // While a target is picked the surface is known: where along its curve the other eye sees the place.
+    curve.paint(canvas, theme::accent(), StrokeStyle::Dashed);
+    // While a target is picked, the range of each cell is known: mark the corresponding pixel on the curve.
     let cell = state.trackability_map().filter(|_| state.mode == Mode::Pick).and_then(|map| map.at(pixel));
     if let Some(seen) = cell.and_then(|cell| curve.at(cell.range_m?)) {
         Overlay::new(&canvas.painter, &canvas.transform).mark(seen, Mark::Ring, theme::accent());
@@ -143,7 +143,7 @@ fn paint_pointed(canvas: &Canvas, state: &State) -> Option<String> {
     Some(format!("curve of x {:.1}  y {:.1} of the left image", pixel.x, pixel.y))
 }
 
-/// The range of the target's curve next to the pointer, m.
+/// Labels the pointer with the range of the nearest point of the target's curve, m.
 fn paint_range(canvas: &Canvas, state: &State, pixel: Pixel) {
     let near = curve_on_image(state).and_then(|curve| curve.nearest(pixel));
     if let Some((range_m, off_px)) = near.filter(|(_, off_px)| state.marks && *off_px <= NEAR_PX) {
@@ -157,7 +157,7 @@ fn paint_range(canvas: &Canvas, state: &State, pixel: Pixel) {
     }
 }
 
-/// The curve of the target's left pixel, where it belongs on the image that is shown.
+/// The curve of the target's left pixel, if the shown images are those of the target's camera.
 fn curve_on_image(state: &State) -> Option<Curve<'_>> {
     target_curve(state).filter(|_| state.shows_targets_camera())
 }

@@ -1,17 +1,18 @@
-//! The left image with all that the tracker knew of the target in it.
+//! The left image with the tracker's marks of the selected target, other targets, features and corners.
 
 use egui::{Margin, Ui, vec2};
 use sightline_session::marks::{basin_of, square};
 use sightline_session::view::TargetView;
 use sightline_vision::image::PixelRect;
 
-use crate::cache::{Eye, Slot};
+use crate::cache::{ImageSide, Slot};
 use crate::command::{Command, Layer, Mode, Zoomable};
 use crate::compare::panel::{bar, marks as compared, modes};
-use crate::drawing::overlay::{Line, Mark, Overlay};
+use crate::drawing::overlay::{Mark, Overlay, StrokeStyle};
 use crate::drawing::raster::Raster;
 use crate::drawing::view2d::Canvas;
 use crate::driving::ground;
+use crate::hovered::Hovered;
 use crate::layout::left_image::keep_left_image;
 use crate::odometry::corners;
 use crate::panels::broken;
@@ -25,7 +26,6 @@ use crate::panels::panel::Panel;
 use crate::panels::status_line::{STATUS, status_line};
 use crate::panels::track;
 use crate::picking;
-use crate::pointed::Pointed;
 use crate::state::{State, row_of, run_letter};
 use crate::what_if::panel;
 use crate::{panels, theme};
@@ -51,7 +51,7 @@ pub(crate) fn show(
     out: &mut Vec<Command>,
 ) -> Option<(crate::drawing::view2d::Transform, [u32; 2])> {
     camera_choice::show(ui, state, out);
-    let raster = ready_image(ui, state, Eye::Left, out)?;
+    let raster = ready_image(ui, state, ImageSide::Left, out)?;
     raster.stretch(state.stretch);
     exposure::show(ui, state, raster, &theme::on_image(|| entries(state)), out);
     bar::show(ui, state, out);
@@ -61,7 +61,7 @@ pub(crate) fn show(
     Some((picture(ui, state, raster, out), raster.size()))
 }
 
-/// The image itself with its marks and the line below it.
+/// The image with its marks and the status line below it.
 fn picture(
     ui: &mut Ui,
     state: &State,
@@ -70,7 +70,7 @@ fn picture(
 ) -> crate::drawing::view2d::Transform {
     let [width, height] = raster.size();
     let region = PixelRect::whole(width, height);
-    let view = state.held_view(state.view(Zoomable::Left), state.trace_on_image());
+    let view = state.stabilised_view(state.view(Zoomable::Left), state.trace_on_image());
     let canvas = Canvas::new(ui, view, region, STATUS);
     canvas.texture(&raster.texture, region);
     modes::under(&canvas, state);
@@ -87,20 +87,20 @@ fn picture(
         panel::over_image(ui, &canvas, state, out);
     }
     corners::hover_left(&canvas, state);
-    let pointed = theme::on_image(|| paint_pointed(&canvas, state));
+    let hovered = theme::on_image(|| paint_hovered(&canvas, state));
     if picking::footer::is_shown(state) {
         picking::footer::show(ui, &canvas, state, described, out);
     } else {
-        status_line(ui, &canvas, raster, region, pointed);
+        status_line(ui, &canvas, raster, region, hovered);
     }
-    out.extend(canvas.hovered(region).map(|pixel| Command::Point(Pointed::Left(pixel))));
+    out.extend(canvas.hovered(region).map(|pixel| Command::Hover(Hovered::Left(pixel))));
     if let Some(view) = canvas.moved {
         out.push(Command::View(Zoomable::Left, view));
     }
     canvas.transform
 }
 
-/// The marks of the step: other targets, corners, features, and what the tracker knew of its target.
+/// The marks of the step: ground, other targets, corners, features, track, and the evidence for the target.
 fn paint_marks(canvas: &Canvas, state: &State) {
     ground::paint(canvas, state);
     paint_others(canvas, state);
@@ -110,28 +110,28 @@ fn paint_marks(canvas: &Canvas, state: &State) {
     let overlay = Overlay::new(&canvas.painter, &canvas.transform);
     track::paint(&overlay, state);
     let of = Of::Shown(theme::run(state.cursor.run));
-    image_marks::paint(&overlay, trace, state.template_side_px(), Eye::Left, of, state);
+    image_marks::paint(&overlay, trace, state.template_side_px(), ImageSide::Left, of, state);
 }
 
-/// An image of the cursor's stop, or the sentence that says why it is not there yet.
+/// An image of the cursor's stop; otherwise shows why it is not available and returns `None`.
 pub(crate) fn ready_image<'a>(
     ui: &mut Ui,
     state: &'a State,
-    eye: Eye,
+    side: ImageSide,
     out: &mut Vec<Command>,
 ) -> Option<&'a Raster> {
-    let word = eye.word();
+    let word = side.word();
     let step = state.cursor.step;
     if state.lacks_images_yet(step) {
         let sentence = state.missing_by_pause(step).unwrap_or_else(|| state.missing_step());
         panels::missing(ui, &format!("The {word} image of step {step} is not taken yet."), &sentence);
         return None;
     }
-    if let Some(sentence) = state.lacks_image(eye) {
+    if let Some(sentence) = state.lacks_image(side) {
         panels::missing(ui, "", &sentence);
         return None;
     }
-    match state.image(eye) {
+    match state.image(side) {
         Slot::Ready(raster) => return Some(raster),
         Slot::Failed(problem) => broken::show(ui, word, step, problem, out),
         Slot::Absent if state.traverse.is_none() => panels::missing(ui, "", &state.missing_target()),
@@ -158,7 +158,7 @@ fn waiting_words(state: &State, word: &str, step: usize) -> String {
     }
 }
 
-/// What the legend of the left image lists.
+/// The legend entries of the left image.
 fn entries(state: &State) -> Vec<Entry> {
     let mut entries = entries_of_step(state);
     if state.mode == Mode::Pick && state.trackability_map().is_some() {
@@ -191,31 +191,36 @@ fn entries_of_step(state: &State) -> Vec<Entry> {
     if trace.prediction().is_some() && trace.point_mast.predicted_left.is_some() {
         entries.push(Entry::new(
             Layer::Prediction,
-            Mark::Stroke(Line::Dotted),
+            Mark::Stroke(StrokeStyle::Dotted),
             theme::prediction(),
             "predicted, 3σ gate",
         ));
     }
     if let Some((_, half_width_m)) = basin_of(trace) {
         let word = format!("basin, half width {:.0} cm", half_width_m * 100.0);
-        entries.push(Entry::new(Layer::Basin, Mark::Stroke(Line::Dashed), theme::basin(), word));
+        entries.push(Entry::new(Layer::Basin, Mark::Stroke(StrokeStyle::Dashed), theme::basin(), word));
     }
     if matched.is_some() {
-        entries.push(Entry::new(Layer::Template, Mark::Stroke(Line::Solid), run, "template window"));
+        entries.push(Entry::new(Layer::Template, Mark::Stroke(StrokeStyle::Solid), run, "template window"));
         entries.push(Entry::new(
             Layer::SearchWindow,
-            Mark::Stroke(Line::Dashed),
+            Mark::Stroke(StrokeStyle::Dashed),
             theme::search(),
             "search window",
         ));
     }
     if trace.capture().is_some_and(|c| c.subframe.is_some()) {
-        entries.push(Entry::new(Layer::Subframe, Mark::Stroke(Line::Dotted), theme::subframe(), "subframe"));
+        entries.push(Entry::new(
+            Layer::Subframe,
+            Mark::Stroke(StrokeStyle::Dotted),
+            theme::subframe(),
+            "subframe",
+        ));
     }
     if track::is_there(state) {
         entries.push(Entry::new(
             Layer::Track,
-            Mark::Stroke(Line::Solid),
+            Mark::Stroke(StrokeStyle::Solid),
             run,
             "track: past solid, future dotted",
         ));
@@ -230,7 +235,7 @@ fn entries_of_step(state: &State) -> Vec<Entry> {
     entries
 }
 
-/// The other targets, where their latest runs place them.
+/// The other targets, at the positions of their latest runs.
 fn paint_others(canvas: &Canvas, state: &State) {
     let Some(session) = state.session.as_ref().filter(|_| state.shows(Layer::Others)) else { return };
     let overlay = Overlay::new(&canvas.painter, &canvas.transform);
@@ -247,18 +252,18 @@ fn paint_others(canvas: &Canvas, state: &State) {
     }
 }
 
-/// What is pointed at in another panel; what that is, in words.
-fn paint_pointed(canvas: &Canvas, state: &State) -> Option<String> {
+/// Paints the position that the pointer selects in another panel. Returns its description.
+fn paint_hovered(canvas: &Canvas, state: &State) -> Option<String> {
     let overlay = Overlay::new(&canvas.painter, &canvas.transform);
-    match state.pointed.filter(|_| state.marks)? {
-        Pointed::Right(pixel) => {
-            let (to, from) = state.eyes()?;
-            Curve::new(from, to, pixel)?.paint(canvas, theme::accent(), Line::Dashed);
+    match state.hovered.filter(|_| state.marks)? {
+        Hovered::Right(pixel) => {
+            let (to, from) = state.stereo_cameras()?;
+            Curve::new(from, to, pixel)?.paint(canvas, theme::accent(), StrokeStyle::Dashed);
             Some(format!("curve of x {:.1}  y {:.1} of the right image", pixel.x, pixel.y))
         }
-        Pointed::Score(pixel) if state.shows_targets_camera() => {
+        Hovered::Score(pixel) if state.shows_targets_camera() => {
             let quad = square(pixel, state.template_side_px(), &nalgebra::Matrix2::identity());
-            overlay.outline(&quad, theme::accent(), Line::Dashed);
+            overlay.outline(&quad, theme::accent(), StrokeStyle::Dashed);
             overlay.mark(pixel, Mark::Plus, theme::accent());
             Some(format!("template at x {:.0}  y {:.0}", pixel.x, pixel.y))
         }

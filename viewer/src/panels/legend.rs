@@ -1,6 +1,6 @@
-//! The legend of an image: each mark with its shape and its word; a click hides or shows it.
+//! The legend of an image: each mark with its shape and label; a click hides or shows its layer.
 //!
-//! An image has it behind a button above it, so that the image has all the room; a panel has it in rows.
+//! Over an image the legend is behind a button, so that the image keeps the space; in a panel it is in rows.
 
 use egui::{Rect, Sense, Ui, vec2};
 
@@ -12,18 +12,18 @@ use crate::theme;
 /// One entry of a legend.
 #[derive(Clone, Debug)]
 pub(crate) struct Entry {
-    /// What it switches.
+    /// The layer that a click hides or shows.
     pub layer: Layer,
-    /// Its shape.
+    /// The mark before the label.
     pub mark: Mark,
-    /// Its colour.
+    /// The colour of the mark.
     pub colour: egui::Color32,
-    /// Its word.
+    /// The label.
     pub word: String,
 }
 
 impl Entry {
-    /// An entry.
+    /// Creates an entry.
     pub(crate) fn new(layer: Layer, mark: Mark, colour: egui::Color32, word: impl Into<String>) -> Self {
         Self { layer, mark, colour, word: word.into() }
     }
@@ -32,7 +32,7 @@ impl Entry {
 /// Height of a row, points.
 const ROW: f32 = 15.0;
 
-/// What a row's mark and margins take beside its word, points.
+/// Width of a row beside its label, for mark and margins, points.
 const MARK: f32 = 32.0;
 
 /// The legend of an image as a button: it opens a list of the marks, in which a click hides or shows one.
@@ -67,19 +67,19 @@ fn shown_id() -> egui::Id {
     egui::Id::unique("pass in which a legend was shown")
 }
 
-/// Whether a legend is open: unlike a list or a menu it leaves the keys to the page.
+/// Whether a legend is open. Unlike a list or a menu, a legend does not take the keyboard from the page.
 pub(crate) fn is_open(context: &egui::Context) -> bool {
     let shown = context.data(|data| data.get_temp::<u64>(shown_id()));
     shown.is_some_and(|pass| pass + 1 >= context.cumulative_pass_nr())
 }
 
-/// What an entry takes beside others, points.
+/// Width of an entry in a row, points.
 pub(crate) fn width_of(ui: &Ui, entry: &Entry) -> f32 {
     let galley = ui.painter().layout_no_wrap(entry.word.clone(), theme::image_font(), theme::text());
     galley.size().x + MARK
 }
 
-/// The legend of an image in rows above it, on the dark ground on which its marks are painted.
+/// The legend of an image in rows above it, on the dark background on which its marks are painted.
 ///
 /// Make the entries inside [`theme::on_image`], so that they have the colours of the marks.
 pub(crate) fn above_image(ui: &mut Ui, entries: &[Entry], state: &State, out: &mut Vec<Command>) {
@@ -96,13 +96,13 @@ pub(crate) fn above_image(ui: &mut Ui, entries: &[Entry], state: &State, out: &m
     });
 }
 
-/// The legend in rows above what follows.
+/// The legend in rows.
 pub(crate) fn above(ui: &mut Ui, entries: &[Entry], state: &State, out: &mut Vec<Command>) {
     let widths: Vec<f32> = entries.iter().map(|entry| width_of(ui, entry)).collect();
     rows(ui, entries, &widths, state, out);
 }
 
-/// The entries one after the other, in as many rows as they need.
+/// The entries in sequence, wrapped to as many rows as needed.
 fn rows(ui: &mut Ui, entries: &[Entry], widths: &[f32], state: &State, out: &mut Vec<Command>) {
     let area = ui.available_rect_before_wrap();
     let mut at = area.left_top();
@@ -116,7 +116,7 @@ fn rows(ui: &mut Ui, entries: &[Entry], widths: &[f32], state: &State, out: &mut
     ui.add_space(at.y + ROW - area.top());
 }
 
-/// One entry in an area of its own; a click hides or shows its layer.
+/// One entry in its own area; a click hides or shows its layer.
 pub(crate) fn row(ui: &Ui, row: Rect, entry: &Entry, state: &State, out: &mut Vec<Command>) {
     let shown = !state.hidden.contains(&entry.layer);
     paint_legend_row(ui.painter(), row.min, entry.mark, entry.colour, &entry.word, shown);

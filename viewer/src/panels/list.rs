@@ -1,9 +1,9 @@
-//! The panel that a name means, as the table in [`super`] has it.
+//! Maps each panel's name to its implementation, from the table in [`super`].
 
 use crate::panels::pane::Pane;
 use crate::panels::panel::Panel;
 
-/// Makes the function from names to panels from their table.
+/// Generates that function from the table.
 macro_rules! panels {
     ($($variant:ident: $name:literal, $title:literal, $home:expr, $help:literal, $($panel:ident)::+;)*) => {
         impl Pane {
@@ -20,7 +20,7 @@ macro_rules! panels {
 panel_table!(panels);
 
 impl Pane {
-    /// Whether the panel can be looked at as tables.
+    /// Whether the panel can be shown as tables.
     pub(crate) fn has_table(self) -> bool {
         self.panel().table().is_some()
     }

@@ -1,10 +1,10 @@
-//! The state machine of loss: where tracking stands, and which criterion fired at each past update (R89–R93).
+//! The state machine of loss: the current tracking state, and the gates that rejected each past update (R89–R93).
 //!
 //! ```text
 //! CLEARED → TRACKING ⇄ LOST (k of n_retry) → FAILED          clear leads to CLEARED from every state
 //! ```
 //! The papers call `tracking` NORMAL and `failed` FAILURE. While lost, up to `n_retry` further updates are tried; the
-//! one that detects the loss does not count among them unless `count_detecting_update` says so (R91).
+//! update that detects the loss does not count unless `count_detecting_update` is set (R91).
 
 use egui::{Align2, Color32, Pos2, Rect, RichText, ScrollArea, Sense, Stroke, StrokeKind, Ui, pos2, vec2};
 use sightline_session::step::StepRow;
@@ -50,18 +50,18 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     });
 }
 
-/// How many updates may follow the one that detects a loss.
+/// Number of updates that may follow the one that detects a loss.
 fn retries(state: &State) -> u32 {
     let limits = &state.run_settings().limits;
     limits.n_retry.saturating_sub(u32::from(limits.count_detecting_update))
 }
 
-/// How many of these retries are used up after `count` rejected updates in a row.
+/// Number of retries used up after `count` rejected updates in a row.
 fn used(count: u32, retries: u32) -> u32 {
     count.saturating_sub(1).min(retries)
 }
 
-/// The present state in words, with what comes next.
+/// The current state in words, with its possible transitions.
 fn sentence(state: &State, now: TrackingState) -> String {
     let n = retries(state);
     match now {
@@ -109,7 +109,7 @@ fn diagram(ui: &mut Ui, state: &State, now: TrackingState) {
 
 fn paint_state(ui: &Ui, frame: Rect, word: &str, below: &str, colour: Color32, is_present: bool) {
     let painter = ui.painter();
-    // The present state is filled and has a thick border, the others are outlines.
+    // The current state is filled and has a thick border, the others are outlines.
     let fill = if is_present { colour.gamma_multiply(0.35) } else { Color32::TRANSPARENT };
     let stroke = Stroke::new(if is_present { 3.0 } else { 1.0 }, colour);
     painter.rect(frame, 6.0, fill, stroke, StrokeKind::Inside);
@@ -130,7 +130,7 @@ fn paint_state(ui: &Ui, frame: Rect, word: &str, below: &str, colour: Color32, i
     );
 }
 
-/// The arrows: pick, bad and good updates, retries without end, and clear.
+/// The arrows: pick, bad and good updates, and exhausted retries.
 fn paint_transitions(ui: &Ui, [cleared, tracking, lost, failed]: [Rect; 4]) {
     let above = |a: Rect, b: Rect, word: &str| {
         let (from, to) = (a.right_top() + vec2(-8.0, 0.0), b.left_top() + vec2(8.0, 0.0));
@@ -163,7 +163,7 @@ fn bent(ui: &Ui, from: Pos2, to: Pos2, rise: f32, word: &str) {
     painter.text(at, align, word, theme::digit_font(), theme::text());
 }
 
-/// One past update: its step, its state, and what fired.
+/// One past update: its step, its state, and the failed gates.
 fn history(ui: &mut Ui, state: &State, run: &RunView, row: &StepRow, out: &mut Vec<Command>) {
     let is_here = row.step == state.cursor.step;
     ui.horizontal_wrapped(|ui| {

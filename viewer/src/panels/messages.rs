@@ -8,7 +8,7 @@ use crate::panels::card;
 use crate::panels::panel::Panel;
 use crate::state::State;
 use crate::state::messages::{Message, Weight};
-use crate::why::Ask;
+use crate::why::WhyCommand;
 use crate::{panels, theme};
 
 /// The panel “Messages”.
@@ -75,12 +75,12 @@ fn show_message(ui: &mut Ui, state: &State, message: &Message, out: &mut Vec<Com
     });
 }
 
-/// A button that takes back what a message tells of, as long as that was the last deed.
+/// A button that undoes the action of a message, as long as it was the last action.
 pub(crate) fn undo(ui: &mut Ui, state: &State, message: &Message, out: &mut Vec<Command>) {
-    if message.deed.is_some_and(|deed| state.undo.is_last(deed)) {
+    if message.change.is_some_and(|change| state.undo.is_last(change)) {
         let button = egui::Button::new("Undo").min_size(egui::vec2(24.0, 22.0));
         if ui.add(button).on_hover_text(UNDO.with_keys("Undoes it")).clicked() {
-            out.push(Command::Why(Ask::Undo));
+            out.push(Command::Why(WhyCommand::Undo));
         }
     }
 }

@@ -1,8 +1,8 @@
-//! The panels: read-only data in, commands out. Each file shows one thing. To add a panel: its own file, which
-//! implements [`panel::Panel`], its `mod` line, and its entry in the table below.
+//! The panels: read-only data in, commands out, one panel per file. To add a panel: create its file, which implements
+//! [`panel::Panel`], and add its `mod` line and its entry in the table below.
 
-/// The panels in the order of the menus: variant of [`pane::Pane`], identifier in stored arrangements, title, home in
-/// the overview, purpose, and path of the implementation in this crate. `$with` is a macro that takes the whole table.
+/// The panels in menu order: variant of [`pane::Pane`], identifier in stored arrangements, title, group in the overview,
+/// purpose, and path of the implementation in this crate. `$with` is a macro that takes the whole table.
 macro_rules! panel_table {
     ($with:ident) => {
         $with! {
@@ -50,7 +50,7 @@ macro_rules! panel_table {
                 panels::history::History;
             Surface: "surface", "Match scores", Home(Group::Scores, 0),
                 "The match score of every position in the search window.",
-                panels::surface::Scores;
+                panels::score_map::Scores;
             StereoProfile: "stereo_profile", "Stereo scores", Home(Group::Scores, 1),
                 "The stereo score of every range that was searched.",
                 panels::stereo_profile::StereoProfile;
@@ -117,7 +117,7 @@ pub(crate) mod legend;
 pub(crate) mod machine;
 pub(crate) mod map;
 pub(crate) mod messages;
-pub(crate) mod names;
+pub(crate) mod chart_legend;
 pub(crate) mod playing;
 pub(crate) mod plots;
 pub(crate) mod runs;
@@ -131,7 +131,7 @@ pub(crate) mod sheets;
 pub(crate) mod stereo_profile;
 pub(crate) mod status_line;
 pub(crate) mod strip;
-pub(crate) mod surface;
+pub(crate) mod score_map;
 pub(crate) mod targets;
 pub(crate) mod timeline;
 pub(crate) mod track;
@@ -145,7 +145,7 @@ pub(crate) use sightline_session::format::number as digits;
 
 use crate::theme;
 
-/// A panel that has nothing to show: what it is for, and the sentence that says how to fill it.
+/// Fills an empty panel: a sentence on how to fill it, and the panel's purpose unless empty.
 pub(crate) fn missing(ui: &mut Ui, purpose: &str, sentence: &str) {
     let space = ui.available_rect_before_wrap();
     let builder = UiBuilder::new().max_rect(space.shrink(6.0)).layout(Layout::top_down(Align::Center));
@@ -158,7 +158,8 @@ pub(crate) fn missing(ui: &mut Ui, purpose: &str, sentence: &str) {
     ui.advance_cursor_after_rect(space);
 }
 
-/// An entry of an open list. Whoever chooses it closes the list: by pointer and key it closes by itself, by a screen reader not.
+/// An entry of an open list. Choosing it closes the list; egui does this for pointer and keyboard but not for a screen
+/// reader.
 pub(crate) fn entry(ui: &mut Ui, is_chosen: bool, words: &str) -> egui::Response {
     let response = ui.selectable_label(is_chosen, words);
     if response.clicked() {

@@ -1,20 +1,20 @@
-//! Numbers: one that can be asked about, whose click leads to where it came from; and a count with its noun.
+//! Numbers: a link from a value to its origin, an input field with limits, and a count with its noun.
 
 use std::cell::RefCell;
 
 use egui::{DragValue, Response, RichText, Ui};
 
 use crate::command::Command;
-use crate::why::Ask;
+use crate::why::WhyCommand;
 
-/// Shows a number as a link to where it came from; `name` is what it is called there.
+/// Shows a number as a link to its origin; `name` identifies it in the panel “Why”.
 pub(crate) fn show(ui: &mut Ui, text: RichText, step: usize, name: &str, out: &mut Vec<Command>) {
     let words = text.text().to_owned();
     let response = ui.link(text).on_hover_text(format!("Why? Where {name} comes from"));
-    ask(&response, step, name, &words, out);
+    explain_on_click(&response, step, name, &words, out);
 }
 
-/// Adds a field for a number from `low` to `high`; while something else is typed, a note at the field says so.
+/// Adds a field for a number from `low` to `high`; input that is not such a number shows a note at the field.
 pub(crate) fn field(ui: &mut Ui, field: DragValue<'_>, low: f64, high: f64) -> Response {
     let wrong = RefCell::new(None);
     let read = |text: &str| {
@@ -39,16 +39,22 @@ pub(crate) fn counted(n: usize, noun: &str) -> String {
     if n == 1 { format!("1 {noun}") } else { format!("{n} {noun}s") }
 }
 
-/// Formats a number with fixed decimals; what rounds to zero has no sign.
+/// Formats a number with fixed decimals; zero after rounding has no sign.
 pub(crate) fn fixed(value: f64, decimals: usize) -> String {
     let words = format!("{value:.decimals$}");
     let is_zero = words.bytes().all(|byte| matches!(byte, b'-' | b'0' | b'.'));
     if is_zero { words.trim_start_matches('-').to_owned() } else { words }
 }
 
-/// Lets a click on something lead to where a value came from.
-pub(crate) fn ask(response: &Response, step: usize, name: &str, copied: &str, out: &mut Vec<Command>) {
-    let why = || Command::Why(Ask::Value { step, value: name.to_owned() });
+/// Adds a link from a value to its origin: by click, and in the context menu.
+pub(crate) fn explain_on_click(
+    response: &Response,
+    step: usize,
+    name: &str,
+    copied: &str,
+    out: &mut Vec<Command>,
+) {
+    let why = || Command::Why(WhyCommand::Value { step, value: name.to_owned() });
     if response.clicked() {
         out.push(why());
     }

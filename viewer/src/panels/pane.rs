@@ -1,20 +1,20 @@
-//! The panels by name, with their constant facts, as the table in [`super`] has them.
+//! The panels by name, with their constant properties from the table in [`super`].
 
 use std::fmt;
 
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// Constant facts about a panel.
+/// Constant properties of a panel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct About {
-    /// Identifier in stored arrangements, `snake_case`. It never changes: stored pages must keep opening.
+    /// Identifier in stored arrangements, `snake_case`. It never changes, so that stored pages can still be opened.
     pub name: &'static str,
     /// Title of the tab.
     pub title: &'static str,
     /// What the panel shows, as one sentence.
     pub help: &'static str,
-    /// Where the overview shows it.
+    /// Its group and position in the overview.
     pub home: Home,
 }
 
@@ -47,16 +47,16 @@ pub enum Group {
     Details,
 }
 
-/// Data that is fetched only while a panel that needs it is on the screen.
+/// Data that is fetched only while a panel that needs it is visible.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Need {
     /// The metrics of the runs.
     Metrics,
     /// The matched window of every step.
     MatchedWindows,
-    /// The scores of the changes that are tried out.
+    /// The scores of the changes that are being tried out.
     TriedScores,
-    /// The answers about the current step.
+    /// The explanations of the current step.
     Explanation,
     /// The studies that the server offers.
     Studies,
@@ -66,7 +66,7 @@ pub enum Need {
     Hazards,
 }
 
-/// Makes the enum of the panels from their table.
+/// Generates the enum of the panels from their table.
 macro_rules! panes {
     ($($variant:ident: $name:literal, $title:literal, $home:expr, $help:literal, $($panel:ident)::+;)*) => {
         /// A panel.
@@ -79,7 +79,7 @@ macro_rules! panes {
             /// All panels, in the order of the menus.
             pub const ALL: [Self; [$($name),*].len()] = [$(Self::$variant),*];
 
-            /// Its constant facts.
+            /// Its constant properties.
             pub const fn about(self) -> About {
                 match self {
                     $(Self::$variant => About { name: $name, title: $title, help: $help, home: $home },)*
@@ -107,7 +107,7 @@ impl Pane {
         Self::ALL.into_iter().find(|pane| pane.name() == name)
     }
 
-    /// The panels of a group of the overview, from the left.
+    /// The panels of a group in the overview, from the left.
     pub fn of_group(group: Group) -> Vec<Self> {
         let place = |pane: &Self| {
             let Home(of, position) = pane.about().home;

@@ -1,7 +1,7 @@
-//! What a panel is: [`Panel`], one implementation a panel, in the panel's own file.
+//! The trait of a panel: [`Panel`], implemented once per panel, in the panel's own file.
 //!
-//! A panel reads the [`State`] and pushes [`Command`]s; it changes nothing itself. The page finds it through one line
-//! of the list in [`super`]: tabs, menus, arrangements, the palette, tables and figures are views of that list.
+//! A panel reads the [`State`] and pushes [`Command`]s; it changes nothing itself. Each panel has one entry in the table
+//! of [`super`], from which tabs, menus, arrangements, the palette, tables and figures are generated.
 
 use egui::{Color32, Margin, Ui};
 
@@ -11,12 +11,12 @@ use crate::panels::sheets::Sheet;
 use crate::state::State;
 use crate::theme;
 
-/// A panel that can be dragged around, closed, looked at as a table and saved as a figure.
+/// A panel that can be moved, closed, shown as a table and saved as a figure.
 pub trait Panel: Sync {
-    /// Paints the panel into `ui` and pushes what the user asks for.
+    /// Paints the panel into `ui` and pushes the user's commands.
     fn show(&self, ui: &mut Ui, state: &State, out: &mut Vec<Command>);
 
-    /// Why the panel has nothing to show, with how to fill it; `None` if it can be shown.
+    /// Why the panel has nothing to show, and how to fill it; `None` if it can be shown.
     ///
     /// The page shows this sentence instead of calling [`Panel::show`].
     fn missing(&self, _state: &State) -> Option<String> {
@@ -33,7 +33,7 @@ pub trait Panel: Sync {
         None
     }
 
-    /// Data that is fetched only while the panel is on the screen.
+    /// Data that is fetched only while the panel is visible.
     fn needs(&self) -> &'static [Need] {
         &[]
     }
@@ -44,5 +44,5 @@ pub trait Panel: Sync {
     }
 }
 
-/// Returns the values of a panel as tables, or the sentence that says why there are none yet.
+/// Returns the values of a panel as tables, or a sentence that explains why there are none.
 pub(crate) type TableOf = fn(&State) -> Result<Vec<Sheet>, String>;

@@ -1,4 +1,4 @@
-//! Plots over the steps of a run: scores, or confidence and inliers; pixel error; position error with its 1 σ.
+//! Plots over the steps of a run: scores, or confidence and inliers; pixel error; position error with its 1σ.
 
 use std::collections::HashMap;
 
@@ -10,16 +10,16 @@ use sightline_session::step::StepRow;
 use sightline_session::view::RunView;
 use sightline_track::settings::TrackerKind;
 
-use crate::breakpoints::Ask;
+use crate::breakpoints::BreakpointCommand;
 use crate::command::{Command, Go};
 use crate::compare::state::Other;
 use crate::drawing::decimate;
 use crate::drawing::overlay;
 use crate::drawing::overlay::Mark;
 use crate::figure;
-use crate::panels::chart::{over_steps, pieces, shape, step_of};
-use crate::panels::names;
-use crate::panels::names::HEIGHT as NAMES;
+use crate::panels::chart::{over_steps, polylines, shape, step_of};
+use crate::panels::chart_legend;
+use crate::panels::chart_legend::HEIGHT as NAMES;
 use crate::panels::panel::{Panel, TableOf};
 use crate::panels::sheets::sheet::state_of;
 use crate::panels::sheets::{Column, Sheet};
@@ -44,7 +44,7 @@ impl Series {
         records::row_quantity(self.column).map_or(self.column, |quantity| quantity.label.as_ref())
     }
 
-    /// What reads the value of a step in `unit`, of any number of steps.
+    /// Returns a function that reads the value of a step in `unit`, for use on any number of steps.
     fn reader(&self, unit: Unit) -> impl Fn(&RunView, &StepRow) -> Option<f64> {
         let declared = records::row_quantity(self.column).map_or(unit, |quantity| quantity.unit);
         let factor = unit.per_base() / declared.per_base();
@@ -54,10 +54,10 @@ impl Series {
     }
 }
 
-/// What reads a number of a row.
+/// Reads a number of a row.
 type Field = fn(&StepRow) -> Option<f64>;
 
-/// The columns that are plotted, each with its field: every painted frame reads them of all steps.
+/// The plotted columns with their fields, because every frame reads them for all steps.
 const FIELDS: [(&str, Field); 7] = [
     ("ncc", |row| row.ncc),
     ("stereo_score", |row| row.stereo_score),
@@ -74,9 +74,9 @@ struct Chart {
     unit: Unit,
     series: Vec<Series>,
     thresholds: Vec<f64>,
-    /// What the thresholds are.
+    /// The label of the thresholds.
     threshold: String,
-    /// Values that are always in view, so that nothing looks large that is not.
+    /// Values that are always in view, so that small values do not look large.
     in_view: [f64; 2],
 }
 
@@ -101,27 +101,27 @@ impl Panel for Plots {
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let Some(run) = state.run() else { return };
     let charts = charts(state, run);
-    let derived = &state.ask.derived;
+    let derived = &state.breakpoints.derived;
     let count = (charts.len() + derived.len()) as f32;
     ui.spacing_mut().item_spacing.y = 1.0;
     let axis = 16.0;
-    // The first row of names also holds a button.
+    // The first row of names also contains a button.
     let button = (ui.spacing().interact_size.y - NAMES).max(0.0);
     let height = ((ui.available_height() - axis - button - count * (NAMES + 2.0)) / count).max(24.0);
     for (i, chart) in charts.iter().enumerate() {
         let is_last = i + 1 == charts.len() && derived.is_empty();
         let (title, mut lines) = names_of(chart);
-        lines.extend(state.others().iter().map(|o| (o.look.mark, o.look.colour, state.run_label(o.name))));
+        lines.extend(state.others().iter().map(|o| (o.style.mark, o.style.colour, state.run_label(o.name))));
         if i == 0 && figure::is_on_paper() {
-            let line = Mark::Stroke(overlay::Line::Solid);
+            let line = Mark::Stroke(overlay::StrokeStyle::Solid);
             lines.push((line, theme::accent(), format!("step {}", state.cursor.step)));
         }
         ui.horizontal(|ui| {
-            // The button first: it stays in the panel where the names need more than that.
+            // The button comes first, so that it stays in the panel if the names exceed the width.
             if i == 0 && !figure::is_on_paper() {
                 choice(ui, out);
             }
-            names::show(ui, &title, &lines);
+            chart_legend::show(ui, &title, &lines);
         });
         let height = if is_last { height + axis } else { height };
         if let Some(step) = plot(ui, state, run, (chart, height, is_last), out) {
@@ -141,7 +141,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     }
 }
 
-/// The list from which any number that a stage declares is added to the plots.
+/// The menu that adds any number that a stage declares to the plots.
 fn choice(ui: &mut Ui, out: &mut Vec<Command>) {
     let stages = records::stages().iter().map(sightline_record::Stage::schema);
     let menu = ui.menu_button(RichText::new("plot …").size(11.0), |ui| {
@@ -151,7 +151,7 @@ fn choice(ui: &mut Ui, out: &mut Vec<Command>) {
                     for (name, quantity) in names_to_plot(schema) {
                         let chosen = entry(ui, false, &name).on_hover_text(quantity.description.as_ref());
                         if chosen.clicked() {
-                            out.push(Command::Ask(Ask::Plot(name)));
+                            out.push(Command::Breakpoints(BreakpointCommand::Plot(name)));
                         }
                     }
                 });
@@ -161,9 +161,9 @@ fn choice(ui: &mut Ui, out: &mut Vec<Command>) {
     menu.response.on_hover_text("Plot any number that a stage declares");
 }
 
-/// The names of a stage's numbers, as expressions know them.
+/// The names of a stage's numbers, as used in expressions.
 pub(crate) fn names_to_plot(schema: &StageSchema) -> impl Iterator<Item = (String, &Quantity)> {
-    // The columns of the row stand alone.
+    // The columns of the row have no prefix.
     let stage = if schema.path.is_empty() { String::new() } else { format!("{}.", schema.stage) };
     let plotted = schema.quantities.iter().filter(|quantity| is_plotted(quantity));
     plotted.flat_map(move |quantity| {
@@ -176,7 +176,7 @@ fn is_plotted(quantity: &Quantity) -> bool {
     quantity.kind != Kind::Word
 }
 
-/// The plots as one table: every line a column, the compared runs beside it, and what is derived.
+/// The plots as one table: a column for every line, followed by those of the compared runs, and the derived values.
 pub(crate) fn sheets(state: &State) -> Result<Vec<Sheet>, String> {
     let run = state.run().ok_or_else(|| state.missing_target())?;
     let (charts, others) = (charts(state, run), state.others());
@@ -193,7 +193,7 @@ pub(crate) fn sheets(state: &State) -> Result<Vec<Sheet>, String> {
         });
         columns.extend(beside);
     }
-    columns.extend(state.ask.derived.iter().map(|derived| {
+    columns.extend(state.breakpoints.derived.iter().map(|derived| {
         let unit = derived.answer.as_ref().map_or("", |answer| answer.unit.as_str());
         let unit = if unit.is_empty() { String::new() } else { format!(", {unit}") };
         Column::new(format!("{}{unit}", derived.expression), "")
@@ -205,7 +205,7 @@ pub(crate) fn sheets(state: &State) -> Result<Vec<Sheet>, String> {
                 .run
                 .rows
                 .iter()
-                .filter_map(|row| Some((state.own_beside(other.name, row.step)?, row)))
+                .filter_map(|row| Some((state.own_aligned_step(other.name, row.step)?, row)))
                 .collect()
         })
         .collect();
@@ -222,7 +222,7 @@ pub(crate) fn sheets(state: &State) -> Result<Vec<Sheet>, String> {
             }
         }
         cells.extend(
-            (0..state.ask.derived.len())
+            (0..state.breakpoints.derived.len())
                 .map(|at| crate::breakpoints::derived_plot::value(state, at, row.step).into()),
         );
         sheet.step(row.step, state.cursor.step, cells);
@@ -268,7 +268,7 @@ fn charts(state: &State, run: &RunView) -> Vec<Chart> {
     charts
 }
 
-/// The scores of a template run with what is asked of them.
+/// The scores of a template run with their thresholds.
 fn scores(state: &State, colour: Color32) -> Chart {
     let limits = &state.run_settings().limits;
     Chart {
@@ -284,7 +284,7 @@ fn scores(state: &State, colour: Color32) -> Chart {
     }
 }
 
-/// The confidence of a run by features, with where the target is lost and where it returns (R184, R185).
+/// The confidence of a run by features, with the thresholds of loss and recovery (R184, R185).
 fn confidence(state: &State, colour: Color32) -> Chart {
     let limits = &state.run_settings().limits;
     let (lost, back) = (limits.confidence_min, limits.confidence_return);
@@ -299,7 +299,7 @@ fn confidence(state: &State, colour: Color32) -> Chart {
     }
 }
 
-/// Its matches that agree with the motion.
+/// The number of inliers of a run by features.
 fn inliers(state: &State, colour: Color32) -> Chart {
     let half = state.run_settings().features.confidence_matches;
     Chart {
@@ -312,18 +312,18 @@ fn inliers(state: &State, colour: Color32) -> Chart {
     }
 }
 
-/// What the row above a plot names.
+/// The title and the names in the row above a plot.
 fn names_of(chart: &Chart) -> (String, Vec<(Mark, Color32, String)>) {
     let symbol = chart.unit.symbol();
     let unit = if symbol.is_empty() { String::new() } else { format!(", {symbol}") };
     let mut names: Vec<_> = chart.series.iter().map(|s| (s.mark, s.colour, s.name().to_owned())).collect();
     if !chart.thresholds.is_empty() {
-        names.push((Mark::Stroke(overlay::Line::Dashed), theme::failed(), chart.threshold.clone()));
+        names.push((Mark::Stroke(overlay::StrokeStyle::Dashed), theme::failed(), chart.threshold.clone()));
     }
     (format!("{}{unit}", chart.title), names)
 }
 
-/// One plot. Returns the step that was clicked.
+/// One plot. Returns the clicked step.
 fn plot(
     ui: &mut Ui,
     state: &State,
@@ -359,12 +359,12 @@ fn plot(
         clicked.map(|at: PlotPoint| at.x.round().clamp(0.0, last) as usize)
     });
     point(&response, last, out);
-    let plotted: Vec<(&str, f64)> = state.row().map(|row| asked_of(chart, row)).unwrap_or_default();
+    let plotted: Vec<(&str, f64)> = state.row().map(|row| plotted_values(chart, row)).unwrap_or_default();
     crate::breakpoints::panel::menu(&response.response, &plotted, out);
     response.inner
 }
 
-/// The values of a chart at a step, one a line: of this run, then of the compared ones.
+/// The values of a chart at a step, one a line: the selected run's, then those of the compared runs.
 fn readout(state: &State, run: &RunView, chart: &Chart, step: usize) -> String {
     let symbol = chart.unit.symbol();
     let unit = if symbol.is_empty() { String::new() } else { format!(" {symbol}") };
@@ -377,7 +377,7 @@ fn readout(state: &State, run: &RunView, chart: &Chart, step: usize) -> String {
         }
         for other in state.others() {
             let mut rows = other.run.rows.iter();
-            let there = rows.find(|row| state.own_beside(other.name, row.step) == Some(step));
+            let there = rows.find(|row| state.own_aligned_step(other.name, row.step) == Some(step));
             if let Some(value) = there.and_then(|row| value(other.run, row)) {
                 words +=
                     &format!("\n{}, {} {}{unit}", line.name(), state.run_label(other.name), digits(value));
@@ -387,26 +387,29 @@ fn readout(state: &State, run: &RunView, chart: &Chart, step: usize) -> String {
     words
 }
 
-/// What a chart shows of a row, as expressions with their values.
-fn asked_of(chart: &Chart, row: &StepRow) -> Vec<(&'static str, f64)> {
+/// The values of a chart at a row, as expressions with their values.
+fn plotted_values(chart: &Chart, row: &StepRow) -> Vec<(&'static str, f64)> {
     let columns = chart.series.iter().map(|line| line.column);
     columns.filter_map(|column| Some((column, records::row_value(row, column)?))).collect()
 }
 
-/// A line over the steps that have a value, broken where one has none.
+/// A line over the steps, broken at those without a value.
 fn paint_series(plot: &mut PlotUi<'_>, run: &RunView, unit: Unit, line: &Series) {
     let value = line.reader(unit);
     let point = |row: &StepRow| value(run, row).filter(|v| v.is_finite()).map(|v| [row.step as f64, v]);
     let points: Vec<Option<[f64; 2]>> = run.rows.iter().map(point).collect();
-    for piece in pieces(&points) {
-        plot.line(Line::new(line.name(), piece.clone()).color(line.colour).width(1.5).allow_hover(false));
+    for polyline in polylines(&points) {
+        plot.line(Line::new(line.name(), polyline.clone()).color(line.colour).width(1.5).allow_hover(false));
         plot.points(
-            Points::new(line.name(), decimate::marks(piece)).color(line.colour).radius(2.5).shape(line.shape),
+            Points::new(line.name(), decimate::marks(polyline))
+                .color(line.colour)
+                .radius(2.5)
+                .shape(line.shape),
         );
     }
 }
 
-/// A line of a compared run over the steps of this one; what is not the run's own colour is dashed.
+/// A line of a compared run over the steps of the selected one; lines other than the main one are dashed.
 fn paint_other(
     plot: &mut PlotUi<'_>,
     state: &State,
@@ -416,18 +419,18 @@ fn paint_other(
 ) {
     let value = line.reader(unit);
     let point = |row: &StepRow| {
-        let step = state.own_beside(other.name, row.step)?;
+        let step = state.own_aligned_step(other.name, row.step)?;
         value(other.run, row).filter(|v| v.is_finite()).map(|v| [step as f64, v])
     };
     let points: Vec<Option<[f64; 2]>> = other.run.rows.iter().map(point).collect();
     let is_main = line.colour == theme::run(run.number);
-    let (colour, name) = (other.look.colour, format!("{}, {}", line.name(), state.run_label(other.name)));
-    for piece in pieces(&points) {
+    let (colour, name) = (other.style.colour, format!("{}, {}", line.name(), state.run_label(other.name)));
+    for polyline in polylines(&points) {
         let style = if is_main { LineStyle::Solid } else { LineStyle::dashed_loose() };
-        plot.line(Line::new("", piece.clone()).color(colour).style(style).width(1.5).allow_hover(false));
+        plot.line(Line::new("", polyline.clone()).color(colour).style(style).width(1.5).allow_hover(false));
         if is_main {
-            let points = Points::new(name.clone(), decimate::marks(piece)).color(colour).radius(3.0);
-            plot.points(points.shape(shape(other.look.mark)));
+            let points = Points::new(name.clone(), decimate::marks(polyline)).color(colour).radius(3.0);
+            plot.points(points.shape(shape(other.style.mark)));
         }
     }
 }

@@ -1,9 +1,9 @@
-//! Runs as a tree: a branch stands below what it left, with only what it changed.
+//! Runs as a tree: a branch is listed below its parent, with only the settings that it changes.
 
 use sightline_session::view::RunView;
 use sightline_track::settings::Settings;
 
-/// The runs in the order of the tree, each with how deep it stands. A branch of a removed run stands with the roots.
+/// The runs in depth-first order, each with its depth. A branch of a removed run is listed as a root.
 pub(crate) fn order(runs: &[RunView]) -> Vec<(usize, &RunView)> {
     let is_root = |run: &&RunView| parent(runs, run).is_none();
     let mut ordered = Vec::new();
@@ -17,13 +17,14 @@ fn add<'a>(runs: &'a [RunView], run: &'a RunView, depth: usize, ordered: &mut Ve
     runs.iter().filter(left).for_each(|child| add(runs, child, depth + 1, ordered));
 }
 
-/// The run that a run left, where that is shown; always an earlier one.
+/// The run from which a run was forked, if it still exists; always an earlier one.
 pub(crate) fn parent<'a>(runs: &'a [RunView], run: &RunView) -> Option<&'a RunView> {
     let left = run.fork.filter(|fork| fork.run < run.number)?.run;
     runs.iter().find(|other| other.number == left)
 }
 
-/// What a run changed: against what it left, or against the defaults where it left none; with where its prediction was put.
+/// The settings that a run changes against its parent, or against the defaults if it has none, and the position of its
+/// prediction if that was set.
 pub(crate) fn changed(runs: &[RunView], run: &RunView) -> Vec<String> {
     let defaults = Settings::default();
     let before = parent(runs, run).map_or(&defaults, |parent| &parent.settings);
@@ -66,7 +67,7 @@ mod tests {
             run(1, Some(Fork::new(0, 3)), &[("ncc_min", json!(0.6)), ("search_window_px", json!(61))]),
             run(2, Some(Fork::new(0, 4)), &[("ncc_min", json!(0.5))]),
             run(3, Some(put), &[("ncc_min", json!(0.6)), ("search_window_px", json!(61))]),
-            // What it left was removed.
+            // Its parent was removed.
             run(6, Some(Fork::new(5, 2)), &[]),
         ];
         let order: Vec<(usize, usize)> =

@@ -1,4 +1,4 @@
-//! What is painted on match scores: the region that they cover, the line of the threshold, prediction, peaks and truth.
+//! Marks on the score map of a match: its region, the contour of the threshold, prediction, peaks and truth.
 
 use egui::vec2;
 use nalgebra::Matrix2;
@@ -8,17 +8,17 @@ use sightline_track::locate::template::match_template::TemplateMatch;
 use sightline_vision::image::PixelRect;
 
 use crate::drawing::contour::contour;
-use crate::drawing::overlay::{Line, Mark, Overlay};
+use crate::drawing::overlay::{Mark, Overlay, StrokeStyle};
 use crate::drawing::raster::Raster;
 use crate::drawing::view2d::Canvas;
 use crate::theme;
 
-/// Vertical distance of the words from their mark, points.
+/// Vertical distance of a label from its mark, points.
 const WORDS: f32 = 12.0;
-/// Height of a line of words, points.
+/// Height of a line of text, points.
 const LINE: f32 = 15.0;
 
-/// The pixels on which the template's centre lay: the search window less half a template on each side.
+/// The pixels that the template's centre can take: the search window less half a template on each side.
 pub(crate) fn region_of(search_window: PixelRect, size: [u32; 2]) -> PixelRect {
     let inset = |whole: u32, inner: u32| (whole.saturating_sub(inner) / 2) as i32;
     PixelRect::new(
@@ -29,7 +29,7 @@ pub(crate) fn region_of(search_window: PixelRect, size: [u32; 2]) -> PixelRect {
     )
 }
 
-/// The line along which the scores have the threshold's height.
+/// The contour of the score map at the threshold.
 pub(crate) fn paint_contour(canvas: &Canvas, raster: &Raster, region: PixelRect, threshold: f32) {
     let (x, y) = (f64::from(region.x), f64::from(region.y));
     let stroke = egui::Stroke::new(1.5, theme::strong());
@@ -39,7 +39,7 @@ pub(crate) fn paint_contour(canvas: &Canvas, raster: &Raster, region: PixelRect,
     }
 }
 
-/// Prediction, peaks and truth on the scores.
+/// Paints prediction, peaks and truth on the score map.
 pub(crate) fn paint_marks(canvas: &Canvas, trace: &RunStep, matched: &TemplateMatch, run: egui::Color32) {
     let pointing = &trace.point_mast;
     let predicted = pointing.predicted_left.map(|pixel| (pixel, pointing.predicted_covariance_px2));
@@ -47,7 +47,7 @@ pub(crate) fn paint_marks(canvas: &Canvas, trace: &RunStep, matched: &TemplateMa
     paint_peaks(canvas, &Marked { predicted, matched, truth, colour: run });
 }
 
-/// What is marked on scores.
+/// The marks on a score map.
 pub(crate) struct Marked<'a> {
     /// The prediction with its covariance, px and px².
     pub predicted: Option<(Pixel, Option<Matrix2<f64>>)>,
@@ -59,13 +59,13 @@ pub(crate) struct Marked<'a> {
     pub colour: egui::Color32,
 }
 
-/// Prediction, peaks and truth.
+/// Paints prediction, peaks and truth.
 pub(crate) fn paint_peaks(canvas: &Canvas, marked: &Marked<'_>) {
     let (matched, run) = (marked.matched, marked.colour);
     let overlay = Overlay::new(&canvas.painter, &canvas.transform);
     if let Some((pixel, covariance)) = marked.predicted {
         if let Some(covariance) = &covariance {
-            overlay.ellipse(pixel, covariance, 3.0, theme::prediction(), Line::Dotted);
+            overlay.ellipse(pixel, covariance, 3.0, theme::prediction(), StrokeStyle::Dotted);
         }
         overlay.mark(pixel, Mark::Cross, theme::prediction());
     }
@@ -75,7 +75,7 @@ pub(crate) fn paint_peaks(canvas: &Canvas, marked: &Marked<'_>) {
         overlay.words(second.pixel, vec2(12.0, second_offset(canvas, matched)), &words, theme::strong());
     }
     let peak = &matched.peak;
-    overlay.ellipse(peak.pixel, &matched.covariance_px2, 3.0, run, Line::Solid);
+    overlay.ellipse(peak.pixel, &matched.covariance_px2, 3.0, run, StrokeStyle::Solid);
     overlay.mark(peak.pixel, Mark::Ring, run);
     overlay.words(peak.pixel, vec2(12.0, -WORDS), &format!("peak {:.3}", peak.score), theme::strong());
     if let Some(pixel) = marked.truth {
@@ -83,14 +83,14 @@ pub(crate) fn paint_peaks(canvas: &Canvas, marked: &Marked<'_>) {
     }
 }
 
-/// Vertical offset of the words of the second peak, so that they are clear of those of the best one, points.
+/// Vertical offset of the second peak's label, which keeps it clear of the best peak's label, points.
 fn second_offset(canvas: &Canvas, matched: &TemplateMatch) -> f32 {
     let y = |pixel: Pixel| canvas.transform.to_screen(pixel).y;
     let second = matched.second_peak.as_ref().map_or(0.0, |second| y(second.pixel));
     clear_of(second, y(matched.peak.pixel) - WORDS)
 }
 
-/// The offset from `at` of words that keep a line of distance from those at `other`: below the mark, else above it.
+/// Offset of a label at `at` that keeps it one line from the label at `other`: below the mark, else above it.
 fn clear_of(at: f32, other: f32) -> f32 {
     if (at + WORDS - other).abs() < LINE { -WORDS - LINE } else { WORDS }
 }

@@ -1,4 +1,4 @@
-//! The settings of the run, made from the table of settings: change some and run again from the cursor's step.
+//! The settings of the run, generated from the table of settings: change some and run again from the cursor's step.
 
 use egui::{Align, CollapsingHeader, Color32, ComboBox, DragValue, Layout, RichText, ScrollArea, Ui, vec2};
 use serde_json::{Value, json};
@@ -45,7 +45,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     });
 }
 
-/// A group of settings; that of a tracker which the next run does not use is folded and says so.
+/// A group of settings; the group of a tracker that the next run does not use is collapsed and labelled so.
 fn show_group(ui: &mut Ui, state: &State, infos: &[SettingInfo], out: &mut Vec<Command>) {
     let Some(group) = infos.first().map(|info| info.group.as_str()) else { return };
     let tracker = state.pending().map_or_else(|| state.tracker(), |settings| settings.tracker);
@@ -68,7 +68,7 @@ fn show_group(ui: &mut Ui, state: &State, infos: &[SettingInfo], out: &mut Vec<C
     }
 }
 
-/// The named configurations: choosing one makes the changes that lead to it, which the next run then uses.
+/// The named configurations: choosing one drafts the changes that lead to it for the next run.
 fn presets(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let now = state.pending().and_then(|settings| state.configurations.named(&settings));
     let name = now.map_or("no preset", |preset| preset.name);
@@ -92,7 +92,7 @@ fn presets(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ui.add(egui::Label::new(theme::note(sentence)).wrap());
 }
 
-/// What is changed, and the buttons that use or drop it.
+/// The drafted changes, and the buttons that run or discard them.
 fn foot(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let step = state.cursor.step;
     ui.horizontal(|ui| {
@@ -145,11 +145,11 @@ fn show_setting(ui: &mut Ui, state: &State, info: &SettingInfo, out: &mut Vec<Co
             ""
         };
         let label = RichText::new(format!("{mark}{}", info.key)).size(12.0).color(colour);
-        // From the right: the unit, the control, and the name in what is left.
+        // From the right: the unit, the control, and the name in the remaining width.
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             ui.allocate_ui_with_layout(vec2(UNIT, 18.0), Layout::left_to_right(Align::Center), |ui| {
                 ui.set_width(UNIT);
-                // Longer ones are words, which the help says.
+                // Longer units are words, which the help contains.
                 let unit = Some(&info.unit).filter(|unit| unit.chars().count() <= 3);
                 ui.label(theme::note(unit.map_or("", String::as_str)));
             });
@@ -170,7 +170,7 @@ fn show_setting(ui: &mut Ui, state: &State, info: &SettingInfo, out: &mut Vec<Co
     }
 }
 
-/// Whether a setting has an effect beside the others, the changed ones among them.
+/// Whether a setting has an effect with the current values of the others, drafted changes included.
 fn has_effect(state: &State, info: &SettingInfo) -> bool {
     let value = |info: &SettingInfo| {
         let drafted = state.draft.get(&info.key).cloned();
@@ -180,7 +180,7 @@ fn has_effect(state: &State, info: &SettingInfo) -> bool {
     info.has_effect(&state.settings, &value)
 }
 
-/// The control of a setting. Returns the new value where the person gave one.
+/// The control of a setting. Returns the new value if the user changed it.
 fn edit(ui: &mut Ui, info: &SettingInfo, value: &Value) -> Option<Value> {
     match &info.domain {
         Domain::Switch => {
@@ -209,7 +209,7 @@ fn edit(ui: &mut Ui, info: &SettingInfo, value: &Value) -> Option<Value> {
             let before = number;
             let field = DragValue::new(&mut number).speed(0.2);
             numbers::field(ui, field, f64::from(*low), f64::from(*high)).accessible_name(&info.key);
-            // An even number cannot be meant: the odd one in the direction of the change is.
+            // Only odd numbers are valid: round an even one in the direction of the change.
             if number != before && number.is_multiple_of(2) {
                 number = if number > before { number + 1 } else { number - 1 };
             }

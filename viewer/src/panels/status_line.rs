@@ -1,4 +1,4 @@
-//! The line below an image: what is under the pointer, and the magnification.
+//! The line below an image: the pixel under the pointer, and the magnification.
 
 use egui::{Align, Layout, Ui};
 use sightline_vision::image::PixelRect;
@@ -10,15 +10,15 @@ use crate::{figure, theme};
 /// Height of the status line below an image, points.
 pub(crate) const STATUS: f32 = 22.0;
 
-/// Pixel and grey value under the pointer, else `pointed`; magnification, and the convention.
+/// Shows pixel and grey value under the pointer, else `hovered` or the image size; and the magnification.
 pub(crate) fn status_line(
     ui: &mut Ui,
     canvas: &Canvas,
     raster: &Raster,
     region: PixelRect,
-    pointed: Option<String>,
+    hovered: Option<String>,
 ) {
-    // A figure has no pointer, and its magnification is not that of the screen.
+    // A figure has no pointer, and its magnification differs from that of the screen.
     if figure::is_on_paper() {
         return;
     }
@@ -34,7 +34,7 @@ pub(crate) fn status_line(
             }
             None => {
                 let size = || format!("{} × {} px", region.width, region.height);
-                ui.label(theme::note(pointed.unwrap_or_else(size)));
+                ui.label(theme::note(hovered.unwrap_or_else(size)));
             }
         }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {

@@ -1,7 +1,7 @@
 //! The score of point stereo along the epipolar curve (K§4.4, R73–R77).
 //!
-//! The axis is inverse range, 1/R, with ticks in metres: along it disparity grows evenly (d = f_p B / R for two eyes
-//! side by side), so that a peak has the same width wherever it stands, and far is left as in the right image.
+//! The axis is inverse range, 1/R, with ticks in metres: disparity is linear in it (d = f_p B / R for two parallel cameras
+//! side by side), so that a peak has the same width everywhere, and far is left as in the right image.
 
 use egui::{Align2, Color32, RichText, Ui, vec2};
 use egui_plot::{
@@ -14,12 +14,12 @@ use sightline_track::trace::StepTrace;
 use crate::command::Command;
 use crate::drawing::overlay;
 use crate::drawing::overlay::Mark;
-use crate::panels::chart::pieces;
+use crate::hovered::Hovered;
+use crate::panels::chart::polylines;
+use crate::panels::chart_legend;
 use crate::panels::image_right::target_curve;
-use crate::panels::names;
 use crate::panels::panel::{Panel, TableOf};
 use crate::panels::sheets;
-use crate::pointed::Pointed;
 use crate::state::State;
 use crate::theme;
 
@@ -29,7 +29,7 @@ const TICKS_M: [f64; 22] = [
     50.0, 100.0,
 ];
 
-/// Two ticks are at least this share of the axis apart.
+/// Minimum distance of two ticks, as a share of the axis.
 const TICK_GAP: f64 = 0.09;
 
 /// The panel “Stereo scores”.
@@ -60,7 +60,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let threshold = state.run_settings().limits.stereo_ncc_min;
     let predicted = predicted_range(trace);
     let run = theme::run(state.cursor.run);
-    names::wrapped(ui, "", &names_of(run, predicted.is_some()));
+    chart_legend::wrapped(ui, "", &names_of(run, predicted.is_some()));
     for words in sentences(stereo, predicted) {
         ui.add(egui::Label::new(words).truncate());
     }
@@ -86,34 +86,38 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             egui_plot::Corner::LeftBottom,
             egui_plot::CoordinatesFormatter::new(|at, _| format!("{:.2} m, score {:.2}", 1.0 / at.x, at.y)),
         );
-    let pointed = match state.pointed.filter(|_| state.marks) {
-        Some(Pointed::Right(pixel)) => target_curve(state).and_then(|curve| curve.nearest(pixel)),
+    let hovered = match state.hovered.filter(|_| state.marks) {
+        Some(Hovered::Right(pixel)) => target_curve(state).and_then(|curve| curve.nearest(pixel)),
         _ => None,
     };
     let hovered = plot.show(ui, |plot| {
         paint(plot, stereo, predicted, threshold, run);
-        if let Some((range_m, _)) = pointed {
+        if let Some((range_m, _)) = hovered {
             plot.vline(VLine::new("", 1.0 / range_m).color(theme::accent()).width(1.0).allow_hover(false));
         }
         plot.pointer_coordinate().filter(|_| plot.response().hovered())
     });
     let range_m = hovered.inner.filter(|at| at.x > 0.0).map(|at| 1.0 / at.x);
-    out.extend(range_m.map(|range_m| Command::Point(Pointed::Range(range_m))));
+    out.extend(range_m.map(|range_m| Command::Hover(Hovered::Range(range_m))));
 }
 
 fn names_of(run: Color32, is_predicted: bool) -> Vec<(Mark, Color32, String)> {
     let mut names = vec![
-        (Mark::Stroke(overlay::Line::Solid), theme::search(), "searched".to_owned()),
+        (Mark::Stroke(overlay::StrokeStyle::Solid), theme::search(), "searched".to_owned()),
         (Mark::Ring, run, "best".to_owned()),
-        (Mark::Stroke(overlay::Line::Dashed), theme::failed(), "threshold".to_owned()),
+        (Mark::Stroke(overlay::StrokeStyle::Dashed), theme::failed(), "threshold".to_owned()),
     ];
     if is_predicted {
-        names.push((Mark::Stroke(overlay::Line::Dotted), theme::prediction(), "predicted ± 3σ".to_owned()));
+        names.push((
+            Mark::Stroke(overlay::StrokeStyle::Dotted),
+            theme::prediction(),
+            "predicted ± 3σ".to_owned(),
+        ));
     }
     names
 }
 
-/// The best position and the interval, in words.
+/// The best match, the left–right check and the searched interval, in words.
 fn sentences(stereo: &PointStereo, predicted: Option<(f64, f64)>) -> [RichText; 3] {
     let at_end = if stereo.at_end { ", AT THE END of the interval" } else { "" };
     let disparity = stereo.disparity_px.map_or_else(String::new, |px| format!(", disparity {px:.2} px"));
@@ -136,7 +140,7 @@ fn sentences(stereo: &PointStereo, predicted: Option<(f64, f64)>) -> [RichText; 
     [theme::note(best).color(colour), theme::note(back), theme::note(interval)]
 }
 
-/// Predicted distance from the left camera and its 1 σ along the line of sight, m.
+/// Predicted distance from the left camera and its 1σ along the line of sight, m.
 fn predicted_range(trace: &StepTrace) -> Option<(f64, f64)> {
     let (prediction, pointing) = (trace.prediction()?, &trace.point_mast);
     let away = prediction.position_in_rover - pointing.left.model.centre();
@@ -146,7 +150,7 @@ fn predicted_range(trace: &StepTrace) -> Option<(f64, f64)> {
     Some((range_m, variance.max(0.0).sqrt()))
 }
 
-/// Ticks at round ranges, which are not even along the axis; where they would crowd, some are left out.
+/// Ticks at round ranges, which are unevenly spaced; ticks that would crowd are omitted.
 fn marks(input: GridInput) -> Vec<GridMark> {
     let (low, high) = input.bounds;
     let gap = (high - low) * TICK_GAP;
@@ -181,8 +185,8 @@ fn paint(
     let point = |p: &sightline_track::locate::template::point_stereo::CurvePoint| {
         Some([1.0 / p.range_m, f64::from(p.score.filter(|score| score.is_finite())?)])
     };
-    for piece in pieces(&stereo.curve.iter().map(point).collect::<Vec<_>>()) {
-        plot.line(Line::new("", piece).color(theme::search()).width(1.5));
+    for polyline in polylines(&stereo.curve.iter().map(point).collect::<Vec<_>>()) {
+        plot.line(Line::new("", polyline).color(theme::search()).width(1.5));
     }
     let best = [1.0 / stereo.range_m, stereo.score];
     plot.vline(VLine::new("", best[0]).color(run).width(1.0).allow_hover(false));

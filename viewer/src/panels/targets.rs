@@ -14,29 +14,29 @@ use crate::panels::panel::Panel;
 use crate::panels::{run_tree, timeline};
 use crate::state::targets::{Rename, Renaming};
 use crate::state::{State, run_letter};
-use crate::why::Ask;
+use crate::why::WhyCommand;
 use crate::{panels, theme};
 
-/// What the panel is for.
+/// The purpose of the panel.
 const PURPOSE: &str = Pane::Targets.about().help;
 
-/// Least height of the list above the lines about the selected run, points; in a lower panel they are at its end.
+/// Minimum panel height at which the lines about the selected run are below the list, points; else they are at its end.
 const LIST_MIN: f32 = 150.0;
 
-/// How much a branch stands in from what it left, points.
+/// Indentation of a branch against its parent, points.
 const INDENT: f32 = 12.0;
 
-/// Width of the band of a run's states, points.
+/// Width of a run's state band, points.
 const BAND_WIDTH: f32 = 56.0;
 
-/// A panel narrower than this has the buttons of a target below its name, points.
+/// A panel narrower than this shows the buttons of a target below its name, points.
 const BUTTONS_BESIDE: f32 = 300.0;
 
 /// The colours of a target's marks: name and number.
 const COLOURS: [(&str, Option<usize>); 5] =
     [("grey", None), ("blue", Some(0)), ("pink", Some(1)), ("violet", Some(2)), ("green", Some(3))];
 
-/// Room beside the field of a name for “Remove”, points.
+/// Width beside the name field for “Remove”, points.
 const NAME_BESIDE: f32 = 80.0;
 
 /// The panel “Targets and runs”.
@@ -81,7 +81,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     });
 }
 
-/// All of the run that is looked at, below the list: a line of the list has no room for it.
+/// The details of the selected run, for which its line in the list has no space.
 fn selected_run(ui: &mut Ui, state: &State) {
     let (Some(target), Some(run)) = (state.target(), state.run()) else { return };
     let mut lines = vec![format!("run {}: {}", run_letter(run.number), summary(run))];
@@ -91,7 +91,7 @@ fn selected_run(ui: &mut Ui, state: &State) {
     }
 }
 
-/// Where a run comes from and what it changes, each as a line.
+/// The parent of a run and the settings that it changes, one line each.
 fn about(target: &TargetView, run: &RunView) -> Vec<String> {
     let from = run.fork.map(|fork| format!("from run {} at step {}", run_letter(fork.run), fork.from_step));
     from.into_iter().chain(run_tree::changed(&target.runs, run)).collect()
@@ -137,7 +137,7 @@ fn show_target(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Co
     }
 }
 
-/// Whether its marks are shown, their colour, and its name.
+/// The switch of a target's marks, their colour, and its name.
 fn title_of(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Command>) {
     let mut is_shown = !state.hidden_targets.contains(&target.number);
     let check = ui.checkbox(&mut is_shown, "").accessible_name(format!("marks of {}", target.label));
@@ -174,7 +174,7 @@ fn buttons_of(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Com
     }
 }
 
-/// The mark of a target in its colour; a click opens the colours to choose from.
+/// The mark of a target in its colour; a click opens the colour choice.
 fn colour_menu(ui: &mut Ui, state: &State, target: &TargetView, out: &mut Vec<Command>) {
     let button = ui.add(egui::Button::new("").frame(false).min_size(vec2(16.0, 16.0)));
     let colour = state.colour_of(target.number);
@@ -202,11 +202,11 @@ fn name(ui: &mut Ui, target: &TargetView, is_selected: bool, out: &mut Vec<Comma
         out.push(Command::Rename(Rename::Begin(target.number)));
     } else if label.clicked() {
         let run = target.runs.last().map_or(0, |run| run.number);
-        out.push(Command::Look { target: target.number, run });
+        out.push(Command::SelectRun { target: target.number, run });
     }
 }
 
-/// The field in which a name is typed: Enter or leaving it saves, Esc cancels.
+/// The input field of a name: Enter or leaving it saves, Esc cancels.
 fn name_field(ui: &mut Ui, renaming: &Renaming, out: &mut Vec<Command>) {
     let mut text = renaming.text.clone();
     let width = (ui.available_width() - NAME_BESIDE).max(60.0);
@@ -230,7 +230,7 @@ fn name_field(ui: &mut Ui, renaming: &Renaming, out: &mut Vec<Command>) {
     }
 }
 
-/// Why the target that is looked at may be badly picked (R21).
+/// Warnings about the designation of the selected target (R21).
 fn warnings<'a>(state: &'a State, target: &TargetView) -> Vec<&'a str> {
     let is_selected = state.cursor.target == Some(target.number);
     let pick = state.trace_at(target.designation.step).ready().filter(|_| is_selected);
@@ -242,7 +242,7 @@ fn show_run(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out:
     let is_selected = state.cursor.target == Some(target.number) && state.cursor.run == run.number;
     let fill = if is_selected { theme::selected() } else { egui::Color32::TRANSPARENT };
     let frame = egui::Frame::new().fill(fill).corner_radius(4).inner_margin(egui::Margin::symmetric(6, 1));
-    // The line hears of a click only where no button in it does: it comes before what is in it.
+    // The line is added before its contents, so that it receives only clicks that no button in it takes.
     let line = egui::UiBuilder::new().id_salt(("run", target.number, run.number)).sense(Sense::click());
     let inside = ui.scope_builder(line, |ui| {
         frame.show(ui, |ui| line_of(ui, state, target, run, out));
@@ -260,11 +260,11 @@ fn show_run(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out:
         )
     });
     if response.clicked() {
-        out.push(Command::Look { target: target.number, run: run.number });
+        out.push(Command::SelectRun { target: target.number, run: run.number });
     }
 }
 
-/// Scrolls to the selected run when another one was selected before: a new branch may be below the visible part of the list.
+/// Scrolls to the selected run after the selection changed: a new branch may be below the visible part of the list.
 fn scroll_to_new(ui: &Ui, line: &egui::Response, run: (usize, usize)) {
     let id = egui::Id::unique("selected run of the list");
     let before = ui.ctx().data_mut(|data| data.get_temp_mut_or(id, run).to_owned());
@@ -274,7 +274,7 @@ fn scroll_to_new(ui: &Ui, line: &egui::Response, run: (usize, usize)) {
     }
 }
 
-/// One line: the run's mark, its states over the steps, what it changes, how far it is, and what can be done with it.
+/// One line: the run's mark, its states over the steps, its settings, its progress and its buttons.
 fn line_of(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: &mut Vec<Command>) {
     ui.set_width(ui.available_width());
     ui.horizontal(|ui| {
@@ -289,7 +289,7 @@ fn line_of(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: 
                 let help = "Removes the run; its branches keep their steps. Ctrl+Z undoes it";
                 let button = ui.small_button("×").accessible_name(name).on_hover_text(help);
                 if button.clicked() {
-                    out.push(Command::Why(Ask::RemoveRun { target: target.number, run: run.number }));
+                    out.push(Command::Why(WhyCommand::RemoveRun { target: target.number, run: run.number }));
                 }
             }
             how_far(ui, state, target, run, out);
@@ -298,7 +298,7 @@ fn line_of(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: 
     });
 }
 
-/// The preset of a run, or what it changes.
+/// The preset of a run, or the settings that it changes.
 fn settings_of(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView) {
     let named = state.configurations.named(&run.settings);
     let is_branch = run_tree::parent(&target.runs, run).is_some();
@@ -311,7 +311,7 @@ fn settings_of(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView) {
     }
 }
 
-/// How far a run is, with a way to stop it.
+/// The progress of a run, with a button to cancel or resume it.
 fn how_far(ui: &mut Ui, state: &State, target: &TargetView, run: &RunView, out: &mut Vec<Command>) {
     if let Some(progress) = state.progress.get(&(target.number, run.number)) {
         if ui.small_button("Cancel").clicked() {

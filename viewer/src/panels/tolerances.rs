@@ -1,7 +1,7 @@
-//! The tolerances of criteria 3 and 4 over the steps, each with the value that is held against it (R86, K-Fig 5).
+//! The tolerances of criteria 3 and 4 over the steps, each with the value compared with it (R86, K-Fig 5).
 //!
-//! Both grow with what was driven and with the range of the stereo measurements that they compare; `stages::judge`
-//! has the equations. Where a value exceeds its tolerance the criterion fires: a cross in vermilion, which the row above names.
+//! Both grow with the distance driven and with the range of the stereo measurements that they compare; `stages::judge` has
+//! the equations. A criterion fires if its value exceeds its tolerance: the plot marks this with a cross in vermilion.
 
 use egui::{Color32, RichText, Ui, vec2};
 use egui_plot::{Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotUi, Points, VLine};
@@ -13,14 +13,14 @@ use crate::command::{Command, Go};
 use crate::drawing::decimate;
 use crate::drawing::overlay;
 use crate::drawing::overlay::Mark;
-use crate::panels::chart::{few_marks, over_steps, pieces, plain};
-use crate::panels::names;
+use crate::panels::chart::{few_marks, over_steps, plain, polylines};
+use crate::panels::chart_legend;
 use crate::panels::panel::{Panel, TableOf};
 use crate::panels::sheets::{Cell, Column, Sheet};
 use crate::state::State;
 use crate::theme;
 
-/// Room for the numbers of the steps below the lower plot, points.
+/// Height of the step numbers below the lower plot, points.
 const AXIS: f32 = 16.0;
 
 /// Height of the sentence above a plot, points.
@@ -60,7 +60,7 @@ impl Criterion {
     }
 }
 
-/// The most firings that are marked: more would cover the plot.
+/// The largest number of firings that are marked: more would cover the plot.
 const FIRED: usize = 100;
 
 /// The panel “Tolerances”.
@@ -97,7 +97,7 @@ impl Panel for Tolerances {
 /// Shows both criteria, one below the other over the same steps.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let Some(run) = state.run() else { return };
-    names::wrapped(ui, "", &names_of(run.number));
+    chart_legend::wrapped(ui, "", &names_of(run.number));
     ui.spacing_mut().item_spacing.y = 1.0;
     let count = CRITERIA.len() as f32;
     let height = (ui.available_height() - AXIS - count * (SENTENCE + 4.0)) / count;
@@ -146,12 +146,12 @@ pub(crate) fn sheets(state: &State) -> Result<Vec<Sheet>, String> {
 fn names_of(run: usize) -> Vec<(Mark, Color32, String)> {
     vec![
         (Mark::Ring, theme::run(run), "value".to_owned()),
-        (Mark::Stroke(overlay::Line::Dashed), theme::lost(), "tolerance".to_owned()),
+        (Mark::Stroke(overlay::StrokeStyle::Dashed), theme::lost(), "tolerance".to_owned()),
         (Mark::Cross, theme::failed(), "fired".to_owned()),
     ]
 }
 
-/// Value and tolerance of the cursor's step, and where the criterion fired, in words.
+/// Value and tolerance at the cursor's step, and the steps at which the criterion fired, in words.
 fn sentence(criterion: &Criterion, run: &RunView, step: usize) -> RichText {
     let here = crate::state::row_of(run, step);
     let pair = here.and_then(|row| Some(((criterion.value_m)(row)?, (criterion.tolerance_m)(row)?)));
@@ -169,7 +169,7 @@ fn sentence(criterion: &Criterion, run: &RunView, step: usize) -> RichText {
     theme::note(format!("{now}; fired at {}", fired.join(", "))).color(theme::lost())
 }
 
-/// One plot. Returns the step that was clicked.
+/// One plot. Returns the clicked step.
 fn plot(
     ui: &mut Ui,
     state: &State,
@@ -199,16 +199,16 @@ fn plot(
 fn paint(plot: &mut PlotUi<'_>, run: &RunView, criterion: &Criterion) {
     let line = |of: fn(&StepRow) -> Option<f64>| -> Vec<Vec<[f64; 2]>> {
         let point = |row: &StepRow| of(row).map(|v| [row.step as f64, v * 100.0]);
-        pieces(&run.rows.iter().map(point).collect::<Vec<_>>())
+        polylines(&run.rows.iter().map(point).collect::<Vec<_>>())
     };
-    for piece in line(criterion.tolerance_m) {
-        plot.line(Line::new("", piece).color(theme::lost()).style(LineStyle::dashed_dense()).width(1.5));
+    for polyline in line(criterion.tolerance_m) {
+        plot.line(Line::new("", polyline).color(theme::lost()).style(LineStyle::dashed_dense()).width(1.5));
     }
-    for piece in line(criterion.value_m) {
+    for polyline in line(criterion.value_m) {
         let colour = theme::run(run.number);
-        plot.line(Line::new("", piece.clone()).color(colour).width(1.5));
+        plot.line(Line::new("", polyline.clone()).color(colour).width(1.5));
         plot.points(
-            Points::new("", decimate::marks(piece)).color(colour).radius(2.5).shape(MarkerShape::Circle),
+            Points::new("", decimate::marks(polyline)).color(colour).radius(2.5).shape(MarkerShape::Circle),
         );
     }
     for &[step, value_cm] in decimate::evenly(&criterion.fired(run), FIRED) {

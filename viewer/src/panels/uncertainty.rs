@@ -1,4 +1,4 @@
-//! Whether the covariances hold: NEES and NIS step by step with their chi-square bands, coverage, and one sentence.
+//! The consistency of the covariances: NEES and NIS per step with chi-square bands, coverage, and a verdict per run.
 
 use egui::{Id, RichText, Ui, UiBuilder, vec2};
 use egui_plot::{HLine, Line, LineStyle, Plot, PlotPoint, PlotUi, Points, VLine};
@@ -7,26 +7,26 @@ use sightline_session::metrics::uncertainty::{Consistency, Uncertainty};
 
 use crate::command::{Command, Go};
 use crate::compare::panel::mark;
-use crate::compare::state::Look;
+use crate::compare::state::RunStyle;
 use crate::drawing::decimate;
 use crate::drawing::overlay;
 use crate::drawing::overlay::Mark;
 use crate::panels;
 use crate::panels::chart::{few_marks, over_steps, plain, shape};
-use crate::panels::names;
+use crate::panels::chart_legend;
 use crate::panels::pane::{Need, Pane};
 use crate::panels::panel::{Panel, TableOf};
 use crate::panels::sheets;
 use crate::state::State;
 use crate::theme;
 
-/// What the panel is for.
+/// The purpose of the panel.
 const PURPOSE: &str = Pane::Uncertainty.about().help;
 
 /// A run whose covariances are shown.
-struct Shown<'a> {
+struct PlottedRun<'a> {
     name: RunName,
-    look: Look,
+    style: RunStyle,
     found: &'a Uncertainty,
 }
 
@@ -54,11 +54,13 @@ impl Panel for UncertaintyPanel {
 /// Shows the verdicts and the plots.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let Some(own) = state.own_name() else { return };
-    let mut names = vec![(own, state.own_look())];
-    names.extend(state.others().iter().map(|other| (other.name, other.look)));
-    let shown: Vec<Shown<'_>> = names
+    let mut names = vec![(own, state.own_style())];
+    names.extend(state.others().iter().map(|other| (other.name, other.style)));
+    let shown: Vec<PlottedRun<'_>> = names
         .iter()
-        .filter_map(|&(name, look)| Some(Shown { name, look, found: &state.metrics(name)?.uncertainty }))
+        .filter_map(|&(name, style)| {
+            Some(PlottedRun { name, style, found: &state.metrics(name)?.uncertainty })
+        })
         .collect();
     if shown.is_empty() {
         let why = state.metrics_problem(own).unwrap_or("The metrics of the run are being computed …");
@@ -78,10 +80,10 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ui.advance_cursor_after_rect(area);
 }
 
-fn verdict(ui: &mut Ui, state: &State, run: &Shown<'_>) {
+fn verdict(ui: &mut Ui, state: &State, run: &PlottedRun<'_>) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(5.0, 1.0);
-        mark(ui, run.look);
+        mark(ui, run.style);
         let words = format!("{}: {}.", state.run_label(run.name), run.found.sentence.trim_end_matches('.'));
         let caveat = "The steps of one run are not independent: the true band is wider than that of independent steps, \
                       hence “probably” until the mean leaves the band of a single value as well.";
@@ -91,22 +93,22 @@ fn verdict(ui: &mut Ui, state: &State, run: &Shown<'_>) {
     });
 }
 
-fn over_the_steps(ui: &mut Ui, state: &State, shown: &[Shown<'_>], out: &mut Vec<Command>) {
-    type Part = (&'static str, &'static str, fn(&Uncertainty) -> &Consistency);
-    const PARTS: [Part; 2] = [
+fn over_the_steps(ui: &mut Ui, state: &State, shown: &[PlottedRun<'_>], out: &mut Vec<Command>) {
+    type CovariancePart = (&'static str, &'static str, fn(&Uncertainty) -> &Consistency);
+    const PARTS: [CovariancePart; 2] = [
         ("NEES", "squared Mahalanobis distance of the error", |found| &found.nees),
         ("NIS", "squared Mahalanobis distance of match and prediction", |found| &found.nis),
     ];
     ui.spacing_mut().item_spacing.y = 1.0;
-    let height = ((ui.available_height() - 16.0) / 2.0 - names::HEIGHT - 2.0).max(24.0);
+    let height = ((ui.available_height() - 16.0) / 2.0 - chart_legend::HEIGHT - 2.0).max(24.0);
     for (i, (title, meaning, of)) in PARTS.into_iter().enumerate() {
         let band = of(shown[0].found).band_of_one;
         let line = (
-            Mark::Stroke(overlay::Line::Dashed),
+            Mark::Stroke(overlay::StrokeStyle::Dashed),
             theme::weak(),
             format!("95 % of single values: {:.2} to {:.1}", band[0], band[1]),
         );
-        names::show(ui, title, &[line]);
+        chart_legend::show(ui, title, &[line]);
         let is_last = i == 1;
         let height = if is_last { height + 16.0 } else { height };
         let words = summary(state, shown, title, meaning, of);
@@ -121,15 +123,15 @@ fn over_the_steps(ui: &mut Ui, state: &State, shown: &[Shown<'_>], out: &mut Vec
     }
 }
 
-/// What a plot shows, in words.
+/// The contents of a plot in words, for screen readers.
 fn summary(
     state: &State,
-    shown: &[Shown<'_>],
+    shown: &[PlottedRun<'_>],
     title: &str,
     meaning: &str,
     of: fn(&Uncertainty) -> &Consistency,
 ) -> String {
-    let run = |run: &Shown<'_>| {
+    let run = |run: &PlottedRun<'_>| {
         let found = of(run.found);
         let mean = found.mean.map_or_else(|| "none".to_owned(), |mean| format!("{mean:.2}"));
         let outside = |value: f64| value < found.band_of_one[0] || value > found.band_of_one[1];
@@ -147,7 +149,7 @@ fn summary(
 fn plot(
     ui: &mut Ui,
     state: &State,
-    shown: &[Shown<'_>],
+    shown: &[PlottedRun<'_>],
     (title, of): (&str, fn(&Uncertainty) -> &Consistency),
     (height, is_last): (f32, bool),
     words: &str,
@@ -170,13 +172,13 @@ fn plot(
             plot.hline(line.width(1.0).allow_hover(false));
         }
         for run in shown {
-            let points = |step: usize| state.own_beside(run.name, step).map(|step| step as f64);
+            let points = |step: usize| state.own_aligned_step(run.name, step).map(|step| step as f64);
             let points: Vec<[f64; 2]> = of(run.found)
                 .steps
                 .iter()
                 .filter_map(|step| Some([points(step.step)?, step.value]))
                 .collect();
-            series(plot, points, run.look);
+            series(plot, points, run.style);
         }
         let clicked = plot.response().clicked().then(|| plot.pointer_coordinate()).flatten();
         clicked.map(|at: PlotPoint| at.x.round().clamp(0.0, last) as usize)
@@ -185,20 +187,20 @@ fn plot(
     response.inner
 }
 
-fn series(plot: &mut PlotUi<'_>, points: Vec<[f64; 2]>, look: Look) {
+fn series(plot: &mut PlotUi<'_>, points: Vec<[f64; 2]>, style: RunStyle) {
     let points = decimate::curve(points);
-    plot.line(Line::new("", points.clone()).color(look.colour).width(1.5).allow_hover(false));
+    plot.line(Line::new("", points.clone()).color(style.colour).width(1.5).allow_hover(false));
     plot.points(
-        Points::new("", decimate::marks(points)).color(look.colour).radius(3.0).shape(shape(look.mark)),
+        Points::new("", decimate::marks(points)).color(style.colour).radius(3.0).shape(shape(style.mark)),
     );
 }
 
-/// The share of errors within k σ against the share that is to be expected.
-fn coverage(ui: &mut Ui, shown: &[Shown<'_>]) {
-    names::show(
+/// The share of errors within k σ against the expected share.
+fn coverage(ui: &mut Ui, shown: &[PlottedRun<'_>]) {
+    chart_legend::show(
         ui,
         "coverage",
-        &[(Mark::Stroke(overlay::Line::Dashed), theme::weak(), "expected".to_owned())],
+        &[(Mark::Stroke(overlay::StrokeStyle::Dashed), theme::weak(), "expected".to_owned())],
     );
     if shown.iter().all(|run| run.found.coverage.is_empty()) {
         panels::missing(ui, "", "Coverage needs the truth, which this traverse does not have.");
@@ -229,7 +231,7 @@ fn coverage(ui: &mut Ui, shown: &[Shown<'_>]) {
                 let line = Line::new("", expected).color(theme::weak()).style(LineStyle::dashed_dense());
                 plot.line(line.width(1.5).allow_hover(false));
             }
-            series(plot, run.found.coverage.iter().map(|c| [c.sigmas, c.share]).collect(), run.look);
+            series(plot, run.found.coverage.iter().map(|c| [c.sigmas, c.share]).collect(), run.style);
         }
     });
     let words =

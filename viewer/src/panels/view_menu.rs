@@ -1,4 +1,4 @@
-//! The menu of what the page looks like: arrangements, closed panels, colours, and where everything else is found.
+//! The menu “View”: arrangements, colours, the tour, and access to palette and help.
 
 use egui::Ui;
 
@@ -9,7 +9,7 @@ use crate::layout::command::LayoutCommand;
 use crate::layout::presets::Preset;
 use crate::state::State;
 use crate::theme;
-use crate::theme::Looks;
+use crate::theme::ColourTheme;
 use crate::tour::Turn;
 
 /// Shows the menu's button, and the menu while it is open.
@@ -29,9 +29,9 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         }
         ui.separator();
         ui.label(theme::title("Colours"));
-        for looks in Looks::ALL {
-            if ui.radio(state.looks == looks, looks.title()).clicked() {
-                out.push(Command::SetLooks(looks));
+        for colour_theme in ColourTheme::ALL {
+            if ui.radio(state.colour_theme == colour_theme, colour_theme.title()).clicked() {
+                out.push(Command::SetColourTheme(colour_theme));
             }
         }
         ui.separator();

@@ -1,33 +1,33 @@
-//! Choosing a place in the left image: by pointer, or by keys that nudge an aim.
+//! The aim: a position in the left image, chosen by pointer or nudged by keys.
 
 use egui::Key;
 use sightline_geometry::frames::Pixel;
 
-/// How far an arrow key moves the aim, px; with Shift.
+/// Displacement of the aim per arrow key, px: without and with Shift.
 const NUDGE_PX: [f64; 2] = [0.1, 1.0];
 
-/// What a person asks of the place that is being chosen.
+/// A command about the aim.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Aim {
-    /// Moves it, px; the first time it begins at the refused pixel, or in the middle of what is shown.
+    /// Moves the aim, px. Without an aim, starts at the refused pixel, otherwise at the centre of the view.
     Nudge {
         /// To the right.
         dx: f64,
         /// Downwards.
         dy: f64,
     },
-    /// Designates the aim; without one, what a refusal offers.
+    /// Designates the aim; without one, accepts the alternative that a refusal offers.
     Accept,
     /// Designates the nearest good pixel that a refusal offers.
     TakeNearest,
-    /// Designates the place that was refused as a bad one all the same.
+    /// Designates the position despite the advice against it.
     Insist,
-    /// Puts the aim on a pixel.
+    /// Sets the aim to a pixel.
     Put(Pixel),
 }
 
 impl Aim {
-    /// What a key asks for while a place is being chosen.
+    /// The command of a key while a target is being picked.
     pub(crate) fn of_key(key: Key, shift: bool) -> Option<Self> {
         let by = NUDGE_PX[usize::from(shift)];
         Some(match key {

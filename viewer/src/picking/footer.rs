@@ -1,14 +1,14 @@
-//! The line below the left image while a target is picked: the verdict on a place with its reason, and the ways on.
+//! The line below the left image while a target is picked: the verdict on a position with its reason, and the possible
+//! actions.
 //!
-//! It takes the place of the status line, so that nothing moves when picking begins or ends, and nothing is written over
-//! the image.
+//! It replaces the status line, so that the layout does not move when picking starts or ends, and no text covers the image.
 
 use egui::{Align, Button, Color32, Label, Layout, Rect, Ui, vec2};
 use sightline_geometry::frames::Pixel;
 use sightline_rover::trackability::{TrackabilityLimits, Verdict};
 
 use crate::command::{Command, Layer, Mode};
-use crate::drawing::overlay::{Line, Mark};
+use crate::drawing::overlay::{Mark, StrokeStyle};
 use crate::drawing::view2d::Canvas;
 use crate::panels::legend;
 use crate::panels::legend::Entry;
@@ -21,17 +21,17 @@ use crate::trackability::limits;
 /// Height of the line's contents, points.
 const ROW: f32 = 18.0;
 
-/// The legend is left out where less remains for the sentence, points.
+/// Minimum width of the sentence, points; with less the legend is omitted.
 const SENTENCE_MIN: f32 = 120.0;
 
-/// Whether the line takes the place of the status line.
+/// Whether the line replaces the status line.
 pub(crate) fn is_shown(state: &State) -> bool {
     state.picks_on_click()
         || state.designating.is_some_and(|place| is_here(state, &place))
         || refusal(state).is_some()
 }
 
-/// The refusal that is shown: one of this stop and camera.
+/// The refusal to show: one of this stop and camera.
 fn refusal(state: &State) -> Option<&Refusal> {
     state.refusal.as_ref().filter(|refusal| is_here(state, &refusal.place))
 }
@@ -44,7 +44,7 @@ pub(crate) fn show(
     place: Option<Pixel>,
     out: &mut Vec<Command>,
 ) {
-    // A row is as high as a control by default, which is more than the line has.
+    // By default a row is as high as a control, which exceeds the line.
     ui.spacing_mut().interact_size.y = ROW;
     ui.spacing_mut().button_padding.y = 0.0;
     ui.horizontal(|ui| {
@@ -66,7 +66,7 @@ pub(crate) fn show(
     });
 }
 
-/// What the line says, and its colour.
+/// The text of the line, and its colour.
 fn sentence(state: &State, place: Option<Pixel>) -> (String, Color32) {
     if state.designating.is_some_and(|place| is_here(state, &place)) {
         return ("Computing the position …".to_owned(), theme::accent());
@@ -89,14 +89,14 @@ fn sentence(state: &State, place: Option<Pixel>) -> (String, Color32) {
     (format!("{} · x {:.1}  y {:.1}", words(&cell), pixel.x, pixel.y), theme::trackability(cell.verdict))
 }
 
-/// A sentence with a capital letter and a full stop.
+/// The sentence with its first letter capitalised and a full stop.
 fn closed(sentence: &str) -> String {
     let mut letters = sentence.trim_end_matches('.').chars();
     let first = letters.next().map(|letter| letter.to_uppercase().to_string()).unwrap_or_default();
     format!("{first}{}.", letters.as_str())
 }
 
-/// What can be done, and how far the map is.
+/// The possible actions, and the progress of the map.
 fn hint(state: &State) -> String {
     let hint = "Click the target, or aim with the arrows and press Enter. Esc cancels.";
     if let Some(name) = state.camera() {
@@ -118,7 +118,7 @@ fn hint(state: &State) -> String {
     }
 }
 
-/// The limits with which the map was made.
+/// The limits with which the map was computed.
 pub(super) fn made_with(state: &State) -> String {
     let limits = state.trackability_map().map(|map| &map.limits).filter(|limits| !limits.is_empty());
     let table = TrackabilityLimits::table();
@@ -132,7 +132,7 @@ pub(super) fn made_with(state: &State) -> String {
     }
 }
 
-/// The nearest good pixel, and the place itself where only the map speaks against it.
+/// Shows a button for the nearest good pixel, and one for the position itself if only the map advises against it.
 fn choices(ui: &mut Ui, refusal: &Refusal, out: &mut Vec<Command>) {
     let mut button = |words: &str, help: &str, aim: Aim| {
         let button = Button::new(egui::RichText::new(words).size(11.5)).min_size(vec2(0.0, ROW));
@@ -149,14 +149,14 @@ fn choices(ui: &mut Ui, refusal: &Refusal, out: &mut Vec<Command>) {
     }
 }
 
-/// The legend of the map of trackability.
+/// The legend of the trackability map.
 pub(crate) fn entries() -> [Entry; 3] {
     let entry = |verdict: Verdict, mark: Mark| {
         Entry::new(Layer::Trackability, mark, theme::trackability(verdict), verdict.word())
     };
-    // From the right to the left.
+    // From right to left.
     [
-        entry(Verdict::Bad, Mark::Stroke(Line::Dotted)),
+        entry(Verdict::Bad, Mark::Stroke(StrokeStyle::Dotted)),
         entry(Verdict::Risky, Mark::Square),
         entry(Verdict::Good, Mark::Dot),
     ]
@@ -169,7 +169,7 @@ fn legend_and_limits(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let button = Button::new(egui::RichText::new("Limits …").size(11.5)).min_size(vec2(0.0, ROW));
     let button = ui.add(button).accessible_name("limits of trackability");
     if button.on_hover_text(made_with(state)).clicked() {
-        out.push(Command::Limits(limits::Ask::Open));
+        out.push(Command::Limits(limits::LimitsCommand::Open));
     }
     let entries = entries();
     let widths = entries.each_ref().map(|entry| legend::width_of(ui, entry));

@@ -1,4 +1,4 @@
-//! The loupe: the surroundings of a place, magnified, with the template window that a pick would take there.
+//! The loupe: the magnified surroundings of a position, with the template window that a pick would take there.
 
 use egui::{Pos2, Rect, Stroke, pos2, vec2};
 use sightline_geometry::frames::Pixel;
@@ -11,10 +11,10 @@ use crate::theme;
 /// Side of the loupe, points.
 const SIDE: f32 = 148.0;
 
-/// Pixels of the image across the loupe; more where the template is larger.
+/// Image pixels across the loupe; more for a large template.
 const PIXELS: f32 = 37.0;
 
-/// The template covers at most this share of the loupe's side.
+/// Maximum fraction of the loupe's side that the template covers.
 const TEMPLATE_SHARE: f32 = 0.6;
 
 /// Distance from the border of the canvas, points.
@@ -30,7 +30,7 @@ pub(super) fn paint(canvas: &Canvas, raster: &Raster, pixel: Pixel, template_px:
     let part = Rect::from_center_size(middle, vec2(pixels / width, pixels / height));
     let painter = &canvas.painter;
     painter.rect_filled(frame, 0.0, theme::well());
-    // Beyond its border a texture repeats its last pixels: the loupe shows the image alone.
+    // Outside its border a texture repeats its edge pixels: the loupe shows only the image.
     let inside = part.intersect(Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0)));
     if inside.is_positive() {
         let to_frame = |at: Pos2| frame.min + (at - part.min) / part.size() * frame.size();
@@ -48,7 +48,7 @@ pub(super) fn paint(canvas: &Canvas, raster: &Raster, pixel: Pixel, template_px:
     paint_mark(painter, frame.center(), Mark::Plus, theme::accent(), 9.0);
 }
 
-/// Where the loupe is: beside the image where there is room, else in a corner of the canvas away from the place.
+/// The loupe's rectangle: beside the image where there is room, otherwise in a corner of the canvas away from the position.
 fn frame(canvas: Rect, image: Rect, at: Pos2) -> Rect {
     let area = canvas.shrink(MARGIN);
     let side = SIDE.min(area.width() / 2.0).min(area.height() / 2.0).max(24.0);

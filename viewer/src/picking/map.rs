@@ -1,6 +1,6 @@
-//! The map of trackability over the left image: good cells tinted, areas of risky cells outlined, poor cells dimmed.
+//! The trackability map over the left image: good cells tinted, areas of risky cells outlined, poor cells dimmed.
 //!
-//! The three verdicts differ in shape and not in colour alone: a fill, an outline, and neither.
+//! The three verdicts differ in shape, not only in colour: a fill, an outline, and neither.
 
 use egui::{Color32, Mesh, Rect, Shape, Stroke};
 use sightline_rover::trackability::{TrackabilityMap, Verdict};
@@ -14,7 +14,7 @@ use crate::theme;
 /// Width of the outline of risky areas, points.
 const OUTLINE: f32 = 1.0;
 
-/// Paints the map over the image, under all marks.
+/// Paints the map over the image, below all marks.
 pub(crate) fn paint(canvas: &Canvas, state: &State) {
     if state.mode != Mode::Pick || !state.shows(Layer::Trackability) {
         return;
@@ -26,7 +26,7 @@ pub(crate) fn paint(canvas: &Canvas, state: &State) {
     }
 }
 
-/// One quad for every run of equal cells in a row.
+/// One quad for every run of cells with the same verdict in a row.
 fn fills(map: &TrackabilityMap, transform: &Transform) -> Mesh {
     let mut mesh = Mesh::default();
     for row in 0..map.rows_done() {
@@ -74,7 +74,7 @@ fn outline_colour() -> Color32 {
     theme::trackability(Verdict::Risky).gamma_multiply(0.8)
 }
 
-/// The screen area of some cells.
+/// The screen area of a block of cells.
 fn area(map: &TrackabilityMap, transform: &Transform, first: [usize; 2], count: [usize; 2]) -> Rect {
     let at = |cells: usize| (cells as u32 * map.cell_px) as i32;
     let side = |cells: usize| cells as u32 * map.cell_px;

@@ -1,7 +1,7 @@
-//! Picking a target in the left image: the map of trackability over it, the loupe, the aim, and the line below the image.
+//! Picking a target in the left image: the trackability map, the loupe, the aim, and the line below the image.
 //!
-//! A click designates. Where the map speaks against a place, the line says why and offers the nearest good pixel and the
-//! place itself; nothing is refused by the page.
+//! A click designates. If the map advises against a position, the line gives the reason and offers the nearest good pixel
+//! and the position itself; the page never refuses a pick.
 
 pub(crate) mod aim;
 pub(crate) mod footer;
@@ -16,26 +16,26 @@ use sightline_session::marks::square;
 use sightline_vision::image::PixelRect;
 
 use crate::command::{Command, Mode};
-use crate::drawing::overlay::{Line, Mark, Overlay};
+use crate::drawing::overlay::{Mark, Overlay, StrokeStyle};
 use crate::drawing::raster::Raster;
 use crate::drawing::view2d::Canvas;
-use crate::state::{Place, State};
+use crate::state::{ImagePosition, State};
 use crate::theme;
 
 impl State {
-    /// Whether a click on the left image designates a target: while one is picked, and without any target.
+    /// Whether a click on the left image designates a target: while one is being picked, or if there is no target yet.
     pub(crate) fn picks_on_click(&self) -> bool {
         let has_none = self.session.as_ref().is_some_and(|session| session.targets.is_empty());
         self.mode == Mode::Pick || (self.mode == Mode::Look && has_none)
     }
 }
 
-/// Whether a place is one of the images that are shown.
-fn is_here(state: &State, place: &Place) -> bool {
+/// Whether a position is in the images that are shown.
+fn is_here(state: &State, place: &ImagePosition) -> bool {
     place.step == state.cursor.step && place.camera == state.camera()
 }
 
-/// A cell in words: verdict and reason, range and longest safe step.
+/// A description of a cell: verdict and reason, range and longest safe step.
 pub(crate) fn words(cell: &Cell) -> String {
     let mut words = cell.verdict.title().to_owned();
     if let Some(sentence) = cell.sentence() {
@@ -50,8 +50,8 @@ pub(crate) fn words(cell: &Cell) -> String {
     words
 }
 
-/// Paints loupe, aim and marks of a pick over the image, and designates on a click. Returns the place that is described
-/// below the image.
+/// Paints loupe, aim and marks of a pick over the image, and designates on a click. Returns the position that the line
+/// below the image describes.
 pub(crate) fn show(
     ui: &Ui,
     canvas: &Canvas,
@@ -69,7 +69,7 @@ pub(crate) fn show(
         canvas.painter.rect_stroke(border, 0.0, Stroke::new(2.0, theme::accent()), egui::StrokeKind::Inside);
     }
     let [width, height] = raster.size();
-    // On a control that lies on the image nothing is picked.
+    // Controls above the image block picking.
     let hovered = canvas.hovered(PixelRect::whole(width, height)).filter(|_| canvas.response.hovered());
     let described = state.trackability.aim.or(hovered);
     let text = described_words(state, described);
@@ -77,7 +77,7 @@ pub(crate) fn show(
     if let Some(pixel) = state.trackability.aim {
         paint_window(canvas, state, pixel);
     }
-    // While a target is picked the loupe is always there.
+    // The loupe is visible as long as a target is being picked.
     let magnified = described.or_else(|| is_picking.then(|| state.first_aim()));
     if let Some(pixel) = magnified {
         loupe::paint(canvas, raster, pixel, state.template_side_px());
@@ -91,15 +91,15 @@ pub(crate) fn show(
     described
 }
 
-/// The window that a pick at the pixel would take.
+/// Paints the window that a pick at the pixel would take.
 fn paint_window(canvas: &Canvas, state: &State, pixel: Pixel) {
     let overlay = Overlay::new(&canvas.painter, &canvas.transform);
     let window = square(pixel, state.template_side_px(), &nalgebra::Matrix2::identity());
-    overlay.outline(&window, theme::accent(), Line::Dotted);
+    overlay.outline(&window, theme::accent(), StrokeStyle::Dotted);
     overlay.mark(pixel, Mark::Plus, theme::accent());
 }
 
-/// A designation that is being computed, or a place that was advised against, with the nearest good pixel.
+/// Paints the designation being computed, or the position that was advised against with the nearest good pixel.
 fn paint_designation(canvas: &Canvas, state: &State) {
     let overlay = Overlay::new(&canvas.painter, &canvas.transform);
     let begun = state.designating.or(state.trackability.judged);
@@ -114,7 +114,7 @@ fn paint_designation(canvas: &Canvas, state: &State) {
     }
 }
 
-/// The image in words, for those who do not see it.
+/// A description of the image for screen readers.
 fn described_words(state: &State, pixel: Option<Pixel>) -> String {
     let mut words = format!("left image of step {}", state.cursor.step);
     if let Some(name) = state.camera() {

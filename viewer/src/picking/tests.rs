@@ -1,5 +1,5 @@
-//! Picking: the map is requested and cancelled, its verdicts are told in words, a place that is not good offers its ways
-//! on below the image, keys do all of it.
+//! Picking: the map is requested and cancelled, its verdicts have words, a position that is not good has alternatives below
+//! the image, and keys can do all of it.
 
 use std::rc::Rc;
 
@@ -18,7 +18,7 @@ use crate::panels::images_left;
 use crate::panels::pane::Pane;
 use crate::picking;
 use crate::picking::aim::Aim;
-use crate::state::{Place, Refusal, State};
+use crate::state::{ImagePosition, Refusal, State};
 use crate::tests::calls::{self, bodies, calls_of};
 use crate::tests::{Shown, fixture};
 use crate::trackability::limits;
@@ -58,7 +58,7 @@ fn progress(k: usize) -> MapProgress {
     MapProgress { k, n: 8, ended: k == 8, failed: None, map: Some(map(k)) }
 }
 
-fn asked(state: &mut State) -> bool {
+fn requests_map(state: &mut State) -> bool {
     !calls_of::<ShowTrackability>(state).is_empty()
 }
 
@@ -76,7 +76,7 @@ fn picking(context: &egui::Context) -> State {
 
 fn refused(context: &egui::Context) -> State {
     let mut state = picking(context);
-    let place = Place { step: 0, pixel: PLACE, camera: None };
+    let place = ImagePosition { step: 0, pixel: PLACE, camera: None };
     state.refusal = Some(Refusal {
         place,
         sentence: "no 3-D position here".to_owned(),
@@ -89,27 +89,27 @@ fn refused(context: &egui::Context) -> State {
 #[test]
 fn the_map_is_asked_for_while_picking_again_with_new_rows_and_given_up_with_the_pick() {
     let mut state = fixture::at_step(&egui::Context::default(), 0);
-    assert!(!asked(&mut state), "nobody picks");
+    assert!(!requests_map(&mut state), "nobody picks");
     state.perform(Command::SetMode(Mode::Pick));
-    assert!(asked(&mut state));
-    assert!(!asked(&mut state), "once");
+    assert!(requests_map(&mut state));
+    assert!(!requests_map(&mut state), "once");
     answer(&mut state, &progress(3));
     assert_eq!(state.trackability_map().unwrap().rows_done(), 3);
     let rows =
         |step| Event::TrackabilityProgress { traverse: "drive".to_owned(), step, k: 5, n: 8, ended: false };
-    state.told(rows(4));
-    assert!(!asked(&mut state), "another stop");
-    state.told(rows(0));
-    assert!(asked(&mut state));
+    state.apply_event(rows(4));
+    assert!(!requests_map(&mut state), "another stop");
+    state.apply_event(rows(0));
+    assert!(requests_map(&mut state));
     answer(&mut state, &progress(5));
     state.perform(Command::SetMode(Mode::Look));
     let cancelled = |state: &mut State| calls_of::<CancelTrackability>(state).len();
     assert_eq!(cancelled(&mut state), 1, "nobody wants the rest");
     assert!(state.trackability_map().is_none());
-    // A map that is complete needs no cancelling.
+    // A complete map needs no cancelling.
     let mut state = picking(&egui::Context::default());
-    state.told(rows(0));
-    assert!(!asked(&mut state));
+    state.apply_event(rows(0));
+    assert!(!requests_map(&mut state));
     state.perform(Command::SetMode(Mode::Look));
     assert_eq!(cancelled(&mut state), 0);
 }
@@ -223,7 +223,7 @@ fn arrows_nudge_the_aim_by_a_tenth_of_a_pixel_and_enter_takes_it() {
     let command = keys::command(Key::Enter, Modifiers::NONE, &state).unwrap();
     state.perform(command);
     assert_eq!(state.designating.unwrap().pixel, Pixel::new(50.0, 31.0));
-    // Outside of picking the arrows step along the drive.
+    // Except while picking, the arrows step along the drive.
     let look = fixture::without_target();
     assert!(matches!(keys::command(Key::ArrowRight, Modifiers::NONE, &look), Some(Command::Go(_))));
 }
@@ -235,31 +235,31 @@ fn the_hint_tells_how_far_the_map_is() {
         state.trackability.progress = Some(progress(3));
         state
     });
-    // Painted words have no node of their own; the image says what is there so far.
+    // Painted words have no accessibility node; the image describes the computed part.
     shown.says("trackability: 38 % good");
     assert!(shown.harness.query_by_label_contains("left image of step 0").is_some());
 }
 
 fn typed(state: &mut State, key: &str, text: &str) {
     let (key, text) = (key.to_owned(), text.to_owned());
-    state.perform(Command::Limits(limits::Ask::Type { key, text }));
+    state.perform(Command::Limits(limits::LimitsCommand::Type { key, text }));
 }
 
 #[test]
 fn limits_are_typed_refused_in_a_sentence_and_used_for_a_map_of_their_own() {
     let mut state = picking(&egui::Context::default());
-    state.perform(Command::Limits(limits::Ask::Open));
+    state.perform(Command::Limits(limits::LimitsCommand::Open));
     assert_eq!(keys::command(Key::T, Modifiers::NONE, &state), None, "the window has the keyboard");
     typed(&mut state, "edge_bad_px", "99");
     typed(&mut state, "cell_px", "16");
-    state.perform(Command::Limits(limits::Ask::Use));
+    state.perform(Command::Limits(limits::LimitsCommand::Use));
     let form = state.trackability.form.clone().unwrap();
     assert!(form.refused.unwrap().contains("edge_bad_px: must be a number from 0 to 50, not 99"));
     assert_eq!(form.texts["cell_px"], "16", "nothing typed is lost");
     typed(&mut state, "edge_bad_px", "4,5");
-    state.perform(Command::Limits(limits::Ask::Use));
+    state.perform(Command::Limits(limits::LimitsCommand::Use));
     assert!(state.trackability.form.is_none());
-    assert!(state.trackability_map().is_none() || asked(&mut state));
+    assert!(state.trackability_map().is_none() || requests_map(&mut state));
     let limits = state.trackability.limits.clone();
     let text = sightline_rover::trackability::TrackabilityLimits::text(&limits);
     assert_eq!(text, "cell_px=16,edge_bad_px=4.5");
@@ -269,12 +269,12 @@ fn limits_are_typed_refused_in_a_sentence_and_used_for_a_map_of_their_own() {
         curl.contains("/traverses/drive/steps/0/trackability?limits=cell_px%3D16%2Cedge_bad_px%3D4.5"),
         "{curl}"
     );
-    // An answer for the limits before is no answer.
+    // A reply for the previous limits is ignored.
     let mut state = fixture::at_step(&egui::Context::default(), 0);
     state.perform(Command::SetMode(Mode::Pick));
-    assert!(asked(&mut state));
+    assert!(requests_map(&mut state));
     state.trackability.limits = limits;
-    assert!(asked(&mut state));
+    assert!(requests_map(&mut state));
     answer(&mut state, &progress(8));
     assert!(state.trackability_map().is_none());
     answer(&mut state, &progress(8));
@@ -293,20 +293,20 @@ fn the_map_says_by_which_limits_it_was_made() {
         state
     });
     changed.says("Map made with edge_bad_px 4.5 px");
-    assert_eq!(changed.click("limits of trackability"), vec![Command::Limits(limits::Ask::Open)]);
+    assert_eq!(changed.click("limits of trackability"), vec![Command::Limits(limits::LimitsCommand::Open)]);
     let mut window = Shown::new(
         [800.0, 900.0],
         |context| {
             let mut state = picking(context);
-            state.perform(Command::Limits(limits::Ask::Open));
+            state.perform(Command::Limits(limits::LimitsCommand::Open));
             state
         },
         crate::trackability::limits_window::show,
     );
     window.harness.get_by_role_and_label(egui::accesskit::Role::TextInput, "slant_risky_deg");
     window.says("default 80.0").says("deg");
-    assert_eq!(window.click("Apply"), vec![Command::Limits(limits::Ask::Use)]);
-    assert_eq!(window.click("Reset"), vec![Command::Limits(limits::Ask::Defaults)]);
+    assert_eq!(window.click("Apply"), vec![Command::Limits(limits::LimitsCommand::Use)]);
+    assert_eq!(window.click("Reset"), vec![Command::Limits(limits::LimitsCommand::Defaults)]);
 }
 
 /// The first cell of a verdict on the map of [`picking`].
@@ -344,7 +344,7 @@ fn a_risky_or_poor_place_gives_its_reason_and_can_be_picked_anyway() {
     state.perform(Command::Pick(poor.pixel));
     state.perform(Command::Aim(Aim::TakeNearest));
     assert!(is_designated(&mut state), "the nearest good one is designated at once");
-    // The server tried this place: there is nothing to insist on.
+    // The server tried this position, so that insisting is impossible.
     let mut state = refused(&egui::Context::default());
     state.perform(Command::Aim(Aim::Insist));
     assert!(!is_designated(&mut state) && state.refusal.is_some());
@@ -419,12 +419,12 @@ fn without_a_target_a_click_on_the_left_image_picks() {
             shown.harness.event(egui::Event::PointerButton { pos: middle, button, pressed, modifiers });
             shown.harness.run_steps(1);
         }
-        shown.asked().into_iter().filter(|command| matches!(command, Command::Pick(_))).count()
+        shown.take_commands().into_iter().filter(|command| matches!(command, Command::Pick(_))).count()
     };
     assert_eq!(click(without), 1);
     assert_eq!(click(|context| fixture::at_step(context, 0)), 0, "a target is there: T begins another pick");
     Shown::pane(Pane::Left, without).says("Click a rock to track it.");
-    // The first click is judged as any other: nothing is designated before the map says something of the place.
+    // The first click is judged like any other: nothing is designated before the map has a verdict.
     for (pixel, is_good) in [(GOOD, true), (PLACE, false)] {
         let mut state = without(&egui::Context::default());
         state.perform(Command::Pick(pixel));
@@ -432,7 +432,7 @@ fn without_a_target_a_click_on_the_left_image_picks() {
         state.take_requests();
         answer(&mut state, &progress(3));
         assert!(!is_designated(&mut state), "its row is not made yet");
-        state.told(Event::TrackabilityProgress {
+        state.apply_event(Event::TrackabilityProgress {
             traverse: "drive".to_owned(),
             step: 0,
             k: 8,
@@ -466,7 +466,7 @@ fn the_note_about_a_pick_is_forgotten_with_its_session() {
     assert_eq!(note(&state).as_deref(), Some("Ridge set; tracking all stops … Use ← →."));
     let mut other = session;
     (other.id, other.targets) = ("s2".to_owned(), Vec::new());
-    state.told(Event::RunProgress {
+    state.apply_event(Event::RunProgress {
         session: "s1".to_owned(),
         target: 0,
         run: 0,

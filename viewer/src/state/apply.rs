@@ -16,7 +16,7 @@ use crate::exports::update::{close_rerun, stream_to_rerun};
 use crate::net::request::Request;
 use crate::state::calls::Notice;
 use crate::state::effect::Effect;
-use crate::state::{Place, Refusal, State, Views, events, run_letter};
+use crate::state::{ImagePosition, Refusal, State, Views, events, run_letter};
 
 impl State {
     /// Applies one command and returns its effects, in order.
@@ -26,7 +26,7 @@ impl State {
         self.outbox.take()
     }
 
-    /// Applies one command; its effects wait with those of answers and events ([`State::take_effects`]).
+    /// Applies one command; its effects are queued with those of replies and events ([`State::take_effects`]).
     pub(crate) fn perform(&mut self, command: Command) {
         let is_draft = matches!(command, Command::Draft { .. } | Command::UsePreset(_) | Command::ClearDraft);
         let draft = is_draft.then(|| self.draft.clone());
@@ -40,7 +40,7 @@ impl State {
         match command {
             Command::Go(go) => self.go(go),
             Command::OpenTraverse(id) => self.open_traverse(id),
-            Command::Look { target, run } => self.look(target, run),
+            Command::SelectRun { target, run } => self.select_run(target, run),
             Command::SelectStage(stage) => self.stage = stage,
             Command::StageBy(by) => {
                 self.stage = self.stage().neighbour(self.tracker(), self.extent(), by);
@@ -66,18 +66,18 @@ impl State {
             Command::View(panel, view) => match panel {
                 Zoomable::Left => self.views.left = view,
                 Zoomable::Right => self.views.right = view,
-                Zoomable::Surface => self.views.surface = view,
+                Zoomable::ScoreMap => self.views.score_map = view,
             },
             Command::ShowCamera(camera) => self.choose_camera(camera),
             Command::SetCalculator(calculator) => self.calculator = calculator,
             Command::SetStretch(stretch) => self.stretch = stretch,
             Command::SetFeatureView(view) => self.feature_view = view,
             Command::SetShapeView(view) => self.shape_view = view,
-            Command::OrderStudy(order) => self.studies.order = order,
+            Command::SetStudyForm(form) => self.studies.form = form,
             Command::StartStudy => self.start_study(),
             Command::CancelStudy(job) => self.cancel_study(job),
             Command::ResumeStudy(job) => self.resume_study(job),
-            Command::LookAtStudy(job) => self.look_at_study(job),
+            Command::ShowStudy(job) => self.show_study(job),
             Command::OpenReport(job) => {
                 self.open_path(&format!("studies/jobs/{job}/report.html"));
             }
@@ -92,26 +92,26 @@ impl State {
             Command::CloseRerun => self.close_rerun(),
             Command::Dismiss(id) => self.messages.dismiss(id),
             Command::Reconnect => self.outbox.push(Request::Reconnect),
-            Command::SetLooks(looks) => {
-                self.looks = looks;
-                self.outbox.add(Effect::UseLooks(looks));
+            Command::SetColourTheme(colour_theme) => {
+                self.colour_theme = colour_theme;
+                self.outbox.add(Effect::UseColourTheme(colour_theme));
             }
             Command::SetSingleKeys(are_on) => self.single_keys = are_on,
             Command::Layout(command) => self.outbox.add(Effect::Layout(command)),
             Command::CopyLink => self.outbox.add(Effect::CopyLink),
-            Command::Compare(ask) => self.ask_compare(ask),
+            Command::Compare(command) => self.apply_compare_command(command),
             Command::Aim(aim) => self.aim(aim),
             Command::Tour(turn) => self.turn_tour(turn),
-            Command::Why(ask) => self.ask_why(ask),
-            Command::Drive(ask) => self.ask_of_driving(ask),
-            Command::Notes(ask) => self.ask_of_notes(ask),
-            Command::Exports(ask) => self.ask_of_exports(ask),
-            Command::Ask(ask) => self.apply_ask(ask),
-            Command::Files(ask) => self.ask_of_files(ask),
+            Command::Why(command) => self.apply_why_command(command),
+            Command::Drive(command) => self.apply_driving_command(command),
+            Command::Notes(command) => self.apply_notes_command(command),
+            Command::Exports(command) => self.apply_exports_command(command),
+            Command::Breakpoints(command) => self.apply_breakpoint_command(command),
+            Command::Files(command) => self.apply_files_command(command),
             Command::CloseCard => self.messages.close_card(),
-            Command::Limits(ask) => self.ask_limits(ask),
+            Command::Limits(command) => self.apply_limits_command(command),
             Command::Table(pane) => self.turn_table(pane),
-            Command::Point(at) => self.pointed = Some(at),
+            Command::Hover(at) => self.hovered = Some(at),
         }
     }
 
@@ -162,14 +162,14 @@ impl State {
         self.open(id);
     }
 
-    fn look(&mut self, target: usize, run: usize) {
+    fn select_run(&mut self, target: usize, run: usize) {
         let is_other = self.cursor.target != Some(target) || self.cursor.run != run;
         let (before, camera) = (self.own_name(), self.camera());
         self.cursor = Cursor { target: Some(target), run, ..self.cursor };
         if self.camera() != camera {
             self.fit_images();
         }
-        self.looked_elsewhere(before, self.cursor);
+        self.keep_comparison(before, self.cursor);
         if is_other {
             self.draft.clear();
         }
@@ -192,9 +192,10 @@ impl State {
         self.mode = mode;
     }
 
-    /// Picks a place: once the map judges it, it is designated or advised against. Without a target a click begins the pick.
+    /// Designates a target at a pixel, or advises against it, once its trackability is computed. The first click starts
+    /// picking.
     pub(crate) fn pick(&mut self, pixel: Pixel) {
-        let place = Place { step: self.cursor.step, pixel, camera: self.camera() };
+        let place = ImagePosition { step: self.cursor.step, pixel, camera: self.camera() };
         if self.mode == Mode::Look {
             self.set_mode(Mode::Pick);
             self.sync_trackability();
@@ -210,8 +211,8 @@ impl State {
         }
     }
 
-    /// Designates a target at a place.
-    pub(crate) fn designate(&mut self, place: Place) {
+    /// Designates a target at an image position.
+    pub(crate) fn designate(&mut self, place: ImagePosition) {
         if self.designating.is_some() {
             self.messages.note("The last designation is still being computed.");
             return;
@@ -233,14 +234,14 @@ impl State {
         (self.designating, self.refusal) = (Some(place), None);
     }
 
-    /// Stops a run, or lets a stopped one go on.
+    /// Stops a run, or resumes a stopped one.
     fn switch_run<E: Endpoint<At = AtRun, Body = NoBody>>(&mut self, target: usize, run: usize) {
         let Some(session) = self.session_id() else { return };
         let call = Call::to::<E>(&AtRun { session, target, run });
         self.call::<E>(call, |state, _| state.sync.session_stale = true);
     }
 
-    /// Forks the run at the cursor; at the designation the whole run is computed again.
+    /// Forks the selected run at the cursor; at the designation, the whole run is recomputed.
     fn run_from_here(&mut self, changes: Changes) {
         let Some((target, run)) = self.target().map(|t| t.number).zip(self.run().map(|r| r.number)) else {
             self.messages.problem("There is no run to leave: pick a target first.", None);
@@ -265,7 +266,7 @@ impl State {
     pub(crate) fn fork(&mut self, target: usize, new: &NewRun) -> bool {
         let Some(session) = self.session_id() else { return false };
         let call = Call::with_body::<ForkRun>(&AtTarget { session, target }, new);
-        self.call::<ForkRun>(call, move |state, run| state.took_run(target, run));
+        self.call::<ForkRun>(call, move |state, run| state.on_run_reply(target, run));
         true
     }
 }

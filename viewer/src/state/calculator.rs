@@ -1,41 +1,41 @@
-//! What the calculator of the error budget is given: a pair of cameras and an approach.
+//! Inputs of the calculator of the error budget: a stereo pair and an approach.
 
 use sightline_geometry::estimate::error_budget::{Approach, TABLE_ONE};
 
-/// Which pair of cameras is calculated.
+/// The stereo pair.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Pair {
-    /// The cameras of the stop that is looked at.
+    /// The cameras of the cursor's stop.
     #[default]
-    Present,
-    /// A row of Table I, with the maker's pixel.
+    Current,
+    /// A row of Table I, with the pixel size of the manufacturer.
     TableOne(usize),
     /// The MER navcam.
     MerNavcam,
 }
 
 impl Pair {
-    /// All of them, in the order of the list.
+    /// All pairs, in the order of the list.
     pub fn all() -> impl Iterator<Item = Self> {
         let table = (0..TABLE_ONE.len()).map(Self::TableOne);
-        std::iter::once(Self::Present).chain(table).chain([Self::MerNavcam])
+        std::iter::once(Self::Current).chain(table).chain([Self::MerNavcam])
     }
 
-    /// Its name in the list.
+    /// The label in the list.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Present => "this traverse's cameras",
+            Self::Current => "this traverse's cameras",
             Self::TableOne(row) => TABLE_ONE[row].name,
             Self::MerNavcam => "MER navcam",
         }
     }
 }
 
-/// What the calculator is given.
+/// Inputs of the calculator.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Calculator {
-    /// The cameras.
+    /// The stereo pair.
     pub pair: Pair,
-    /// The drive and what goes wrong on it.
+    /// The approach to the target, with its error sources.
     pub approach: Approach,
 }

@@ -1,4 +1,4 @@
-//! Calls of endpoints and their answers.
+//! Calls of endpoints and their replies.
 
 use sightline_api::endpoint::{Call, Endpoint, Method};
 use sightline_api::wire::Problem;
@@ -6,22 +6,22 @@ use sightline_api::wire::Problem;
 use crate::net::request::Reply;
 use crate::state::State;
 
-/// How the page shows that a call was refused.
+/// Where the page shows that a call was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Notice {
-    /// As a card, and in the list of messages.
+    /// As a card and in the list of messages.
     Card,
-    /// In the list of messages alone: the panel that made the call shows it too.
+    /// Only in the list of messages: the panel that made the call shows it too.
     List,
 }
 
 impl State {
-    /// Calls `E`; `take` gets the reply, and a refusal is shown as a card.
+    /// Calls `E`; `take` receives the reply. A refusal is shown as a card.
     pub(crate) fn call<E: Endpoint>(&mut self, call: Call, take: impl FnOnce(&mut Self, E::Reply) + 'static) {
         self.call_or::<E>(call, take, |_, _| Notice::Card);
     }
 
-    /// Calls `E`; `take` gets the reply, `refused` the problem.
+    /// Calls `E`; `take` receives the reply, `refused` the problem.
     pub(crate) fn call_or<E: Endpoint>(
         &mut self,
         call: Call,
@@ -30,11 +30,11 @@ impl State {
     ) {
         // A retry supersedes the earlier refusal.
         if call.method != Method::Get {
-            self.messages.mended(&format!("{} {}", call.method, call.path));
+            self.messages.mark_resolved(&format!("{} {}", call.method, call.path));
         }
         let request = self.calls.begin::<E>(call, move |state: &mut Self, call, outcome| match outcome {
             Ok(reply) => {
-                state.messages.mended(&format!("{} {}", call.method, call.path));
+                state.messages.mark_resolved(&format!("{} {}", call.method, call.path));
                 take(state, reply);
             }
             Err(problem) => match refused(state, &problem) {
@@ -45,7 +45,7 @@ impl State {
         self.outbox.push(request);
     }
 
-    /// Calls `E`; `take` gets the reply or the problem, of which nothing is shown.
+    /// Calls `E`; `take` receives the reply or the problem. No message is shown.
     pub(crate) fn call_with_problem<E: Endpoint>(
         &mut self,
         call: Call,
@@ -55,8 +55,8 @@ impl State {
         self.outbox.push(request);
     }
 
-    /// Passes the answer to a call on to its reader.
-    pub(crate) fn answered_call(&mut self, ticket: u64, outcome: Result<Reply, Problem>) {
+    /// Passes the answer of a call to its receiver.
+    pub(crate) fn finish_call(&mut self, ticket: u64, outcome: Result<Reply, Problem>) {
         let outcome = match outcome {
             Ok(Reply::Body(bytes)) => Ok(bytes),
             Ok(Reply::Item(_)) => return,
@@ -67,9 +67,9 @@ impl State {
         }
     }
 
-    /// The calls that wait for their answers, with their tickets, oldest first.
+    /// The pending calls with their tickets, oldest first.
     #[cfg(test)]
-    pub(crate) fn waiting_calls(&self) -> impl Iterator<Item = (u64, &Call)> {
+    pub(crate) fn pending_calls(&self) -> impl Iterator<Item = (u64, &Call)> {
         self.calls.iter()
     }
 

@@ -1,22 +1,22 @@
-//! The camera of a stop whose images are shown: the main pair, or a further camera by its name.
+//! The camera whose images are shown: the main pair, or a further camera of the stop.
 //!
-//! The images follow the target that is selected until a person chooses another camera; the choice ends with the selection.
+//! By default it is the camera of the selected target. A choice of the user lasts as long as the target is selected.
 
 use sightline_api::wire::StopCameraView;
 use sightline_geometry::camera::{Camera, CameraName};
 use sightline_session::compare::RunName;
 use sightline_session::step::RunStep;
 
-use crate::cache::{Eye, Key};
+use crate::cache::{ImageSide, Key};
 use crate::drawing::view2d::View2d;
 use crate::state::State;
 
-/// A camera that a person chose while a target was selected.
+/// The user's choice of a camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct ChosenCamera {
-    /// The target that was selected.
+    /// The target that was selected at the time.
     target: Option<usize>,
-    /// The camera; the main pair for `None`.
+    /// The camera; `None`: the main pair.
     camera: Option<CameraName>,
 }
 
@@ -27,12 +27,12 @@ impl State {
         chosen.map_or_else(|| self.camera_of_target(), |chosen| chosen.camera)
     }
 
-    /// The camera that a person chose for the selected target, where it is not that of the target.
+    /// The camera for the link; `None` if it is the selected target's own, `Some(None)`: the main pair.
     pub(crate) fn camera_to_link(&self) -> Option<Option<CameraName>> {
         Some(self.camera()).filter(|camera| *camera != self.camera_of_target())
     }
 
-    /// Shows the images of another camera, in full.
+    /// Shows another camera, with its images fitted to their panels.
     pub(crate) fn choose_camera(&mut self, camera: Option<CameraName>) {
         if camera != self.camera() {
             self.fit_images();
@@ -40,7 +40,7 @@ impl State {
         self.chosen_camera = Some(ChosenCamera { target: self.cursor.target, camera });
     }
 
-    /// Shows the images in full, because a view of another camera means nothing in them.
+    /// Fits the images to their panels; a zoom and an aim in another camera's pixels are meaningless.
     pub(crate) fn fit_images(&mut self) {
         (self.views.left, self.views.right) = (View2d::Fit, View2d::Fit);
         self.trackability.aim = None;
@@ -55,22 +55,22 @@ impl State {
         self.run_named(run).and_then(|(target, _)| target.designation.camera)
     }
 
-    /// Whether the images that are shown are those in which the selected target is tracked.
+    /// Whether the images are of the camera in which the selected target is tracked.
     pub(crate) fn shows_targets_camera(&self) -> bool {
         self.camera() == self.camera_of_target()
     }
 
-    /// What the cursor's step saw and decided, where it belongs on the images that are shown.
+    /// The record of the cursor's step; `None` unless the images are of the target's camera.
     pub(crate) fn trace_on_image(&self) -> Option<&RunStep> {
         self.trace().filter(|_| self.shows_targets_camera())
     }
 
-    /// The further camera of a stop by its name.
+    /// A further camera of a stop; `None` if the stop lacks it.
     pub(crate) fn further_camera(&self, step: usize, name: CameraName) -> Option<&StopCameraView> {
         self.traverse.as_ref()?.stops.get(step)?.cameras.iter().find(|camera| camera.name == name)
     }
 
-    /// Width and height of the left image of the cursor's stop, px; `None` where it has none.
+    /// Width and height of the left image of the cursor's stop, px; `None` without an image.
     pub(crate) fn left_size(&self) -> Option<[u32; 2]> {
         match self.camera() {
             None => self.stop().map(|stop| stop.left_size),
@@ -78,33 +78,39 @@ impl State {
         }
     }
 
-    /// Why the cursor's stop has no such image of the camera that is shown, as a sentence; `None` where it has it.
-    pub(crate) fn lacks_image(&self, eye: Eye) -> Option<String> {
+    /// Why the camera has no such image at the cursor's stop, as a sentence; `None` if it has one.
+    pub(crate) fn lacks_image(&self, side: ImageSide) -> Option<String> {
         let (step, name) = (self.cursor.step, self.camera()?);
         self.stop()?;
         let Some(camera) = self.further_camera(step, name) else {
             return Some(format!("Step {step} has no camera {name}. Choose another camera above."));
         };
-        let is_missing = eye == Eye::Right && camera.right_size.is_none();
+        let is_missing = side == ImageSide::Right && camera.right_size.is_none();
         is_missing.then(|| {
             format!("The camera {name} of step {step} is a single one: it has no right image, and no target can be tracked in it.")
         })
     }
 
-    /// The name of an image of a stop in any camera; `None` where the stop lacks it.
-    pub(crate) fn image_key_in(&self, step: usize, camera: Option<CameraName>, eye: Eye) -> Option<Key> {
+    /// The cache key of an image of a stop; `None` if the stop lacks it.
+    pub(crate) fn image_key_in(
+        &self,
+        step: usize,
+        camera: Option<CameraName>,
+        side: ImageSide,
+    ) -> Option<Key> {
         let traverse = self.traverse.as_ref()?.id.clone();
         if let Some(name) = camera {
             let found = self.further_camera(step, name)?;
-            if eye == Eye::Right {
+            if side == ImageSide::Right {
                 found.right_size?;
             }
         }
-        Some(Key::Image { traverse, step, eye, camera })
+        Some(Key::Image { traverse, step, side, camera })
     }
 
-    /// The two cameras of the cursor's step that is shown, in the rover frame, once they are here.
-    pub fn eyes(&self) -> Option<(&Camera, &Camera)> {
+    /// The left and right cameras of the images that are shown, in the rover frame; `None` until loaded or without a right
+    /// camera.
+    pub fn stereo_cameras(&self) -> Option<(&Camera, &Camera)> {
         if let Some(pointing) = self.trace_on_image().map(|trace| &trace.point_mast) {
             return Some((&pointing.left, &pointing.right));
         }

@@ -1,9 +1,9 @@
-//! Named configurations, and which one a run is.
+//! The named configurations, and the lookup of the one that a run uses.
 
 use sightline_track::presets::{PRESETS, Preset};
 use sightline_track::settings::Settings;
 
-/// The named configurations with the settings that they stand for.
+/// The named configurations with their settings.
 pub struct Configurations(Vec<(&'static Preset, Settings)>);
 
 impl Default for Configurations {
@@ -14,12 +14,12 @@ impl Default for Configurations {
 }
 
 impl Configurations {
-    /// Every named configuration, in the order in which they are listed.
+    /// All named configurations, in the order of the list.
     pub fn all(&self) -> impl Iterator<Item = &'static Preset> {
         self.0.iter().map(|(preset, _)| *preset)
     }
 
-    /// The one whose settings these are.
+    /// The configuration with exactly these settings.
     pub fn named(&self, settings: &Settings) -> Option<&'static Preset> {
         self.0.iter().find(|(_, of_preset)| of_preset == settings).map(|(preset, _)| *preset)
     }

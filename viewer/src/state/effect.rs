@@ -1,39 +1,39 @@
-//! Effects: what a change of the state asks of the page around it. The state itself does no input or output.
+//! Effects: the input and output that a change of state requires. The page carries them out; the state does none itself.
 
-use crate::figure::wish::Wish;
+use crate::figure::request::FigureRequest;
 use crate::layout::command::LayoutCommand;
 use crate::net::request::Request;
 use crate::panels::pane::Pane;
-use crate::theme::Looks;
+use crate::theme::ColourTheme;
 
-/// Something that the page does for the state.
+/// An action that the page carries out for the state.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Effect {
     /// Sends a request to the server.
     Send(Request),
     /// Opens a page in a new tab.
     OpenUrl(String),
-    /// Copies the link to what is shown.
+    /// Copies the link to the current view.
     CopyLink,
-    /// Changes the arrangement of the panels.
+    /// Changes the layout of the panels.
     Layout(LayoutCommand),
     /// Sets the colours of the page.
-    UseLooks(Looks),
+    UseColourTheme(ColourTheme),
     /// Lets the user choose a file.
     ChooseFile,
-    /// Lets the user choose the folder of a recording, or an archive of one.
+    /// Lets the user choose a recording.
     ChooseRecording {
-        /// Whether it is an archive.
+        /// Whether it is an archive file rather than a folder.
         is_archive: bool,
     },
-    /// Sends the recording that was chosen last to an upload of this name.
+    /// Sends the recording chosen last to the upload with this name.
     SendRecording(String),
-    /// Sends no more of it.
+    /// Stops sending the recording.
     StopSending,
     /// Reads the file at a path.
     ReadFile(String),
     /// Saves a panel as a figure.
-    SaveFigure(Wish),
+    SaveFigure(FigureRequest),
 }
 
 impl Effect {
@@ -43,7 +43,7 @@ impl Effect {
     }
 }
 
-/// Effects that wait to be carried out, oldest first.
+/// Pending effects, oldest first.
 #[derive(Debug, Default)]
 pub(crate) struct Outbox(Vec<Effect>);
 
@@ -58,12 +58,12 @@ impl Outbox {
         self.0.push(effect);
     }
 
-    /// Takes all effects out.
+    /// Removes and returns all effects.
     pub(crate) fn take(&mut self) -> Vec<Effect> {
         std::mem::take(&mut self.0)
     }
 
-    /// Takes the requests out and leaves the other effects.
+    /// Removes and returns the requests; the other effects remain.
     #[cfg(test)]
     pub(crate) fn take_requests(&mut self) -> Vec<Request> {
         let (mut requests, mut others) = (Vec::new(), Vec::new());

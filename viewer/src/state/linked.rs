@@ -1,4 +1,4 @@
-//! Converts the state to the address of the page, and an address to the state.
+//! Converts the state to the fragment of the page's address, and a fragment to a state.
 
 use sightline_session::compare::RunName;
 
@@ -9,7 +9,7 @@ use crate::state::State;
 use crate::state::run_letter;
 
 impl State {
-    /// The link to this view without the arrangement of the panels.
+    /// The link to the current view, without the layout of the panels.
     pub fn fragment(&self) -> Fragment {
         let at = |view: View2d| Some(view).filter(|view| *view != View2d::Fit);
         let Some(session) = &self.session else { return Fragment::default() };
@@ -31,7 +31,7 @@ impl State {
         }
     }
 
-    /// Goes where a link says: at once where its session is open, else when that is here.
+    /// Follows a link: at once if its session is open, otherwise once it is loaded.
     pub(crate) fn open_link(&mut self, link: Fragment) {
         for part in &link.damaged {
             self.messages.problem(
@@ -54,7 +54,7 @@ impl State {
         }
     }
 
-    /// Carries the link out once its session is here.
+    /// Applies the link once its session is loaded.
     pub(crate) fn follow_link(&mut self) {
         let Some(session) = &self.session else { return };
         let is_for_this = |link: &mut Fragment| link.session.as_ref() == Some(&session.id);
@@ -95,7 +95,7 @@ impl State {
         self.compare.others = others;
         self.compare.view = link.compared.unwrap_or_default();
         self.compare.sort = link.sort.unwrap_or_default();
-        // A blank at the end is being typed: the address does not have it.
+        // A trailing blank is still being typed and is not part of the address.
         let filter = link.filter.unwrap_or_default();
         if self.compare.filter.trim() != filter {
             self.compare.filter = filter;
@@ -111,7 +111,7 @@ impl State {
     }
 }
 
-/// A part of a link as it can be shown: short, and without signs that move the line.
+/// A part of a link for display: shortened, without control characters.
 fn shown(part: &str) -> String {
     part.chars().filter(|c| !c.is_control()).take(60).collect()
 }

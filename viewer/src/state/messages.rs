@@ -1,35 +1,35 @@
-//! What was said to the person, newest last. The problem that was met last also has a card, until it is closed.
+//! Messages to the user, newest last. The latest problem is also shown as a card until it is closed.
 
 use sightline_api::wire::Problem;
 
-/// How much a message matters.
+/// Importance of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Weight {
-    /// Something happened as asked.
+    /// An action succeeded.
     Note,
-    /// Something was refused or failed.
+    /// An action was refused or failed.
     Problem,
 }
 
 /// One message.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Message {
-    /// What tells it from the others.
+    /// Unique number of the message.
     pub id: u64,
-    /// How much it matters.
+    /// Its importance.
     pub weight: Weight,
     /// One sentence.
     pub text: String,
-    /// How to mend it.
+    /// How to resolve the problem.
     pub hint: Option<String>,
-    /// A page that belongs to it.
+    /// URL of a related page.
     pub link: Option<String>,
-    /// How often it was said in a row.
+    /// Number of consecutive occurrences.
     pub count: u32,
-    /// What else is known of a problem.
+    /// Details of a problem.
     pub about: Option<Box<About>>,
-    /// The deed that it tells of, which can be taken back while it is the last one.
-    pub deed: Option<u64>,
+    /// Number of the change that the message offers to undo while it is the last one.
+    pub change: Option<u64>,
     /// Whether it is about a target or a run of the open session.
     pub is_of_session: bool,
     /// Whether it applies only while a run is computed.
@@ -38,17 +38,17 @@ pub struct Message {
     pub is_past: bool,
 }
 
-/// What else is known of a problem.
+/// Details of a problem.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct About {
-    /// Its stable name.
+    /// Stable code of the problem.
     pub code: String,
-    /// Names and values: what was asked, field, request and time.
+    /// Names and values: the refused request, the field, the request id, the time and the status.
     pub details: Vec<(&'static str, String)>,
 }
 
 impl Message {
-    /// All that is known of it, as text to copy.
+    /// The message with all details, as text to copy.
     pub fn words(&self) -> String {
         let mut words = self.text.clone();
         let hint = self.hint.iter().map(|hint| ("what to do", hint.clone()));
@@ -72,16 +72,16 @@ pub struct Messages {
     card: Option<u64>,
 }
 
-/// How many messages are kept.
+/// Maximum number of stored messages.
 const KEPT: usize = 50;
 
 impl Messages {
-    /// Something happened as asked.
+    /// Adds a note: an action succeeded.
     pub fn note(&mut self, text: impl Into<String>) {
         self.add(Weight::Note, text.into(), None, None);
     }
 
-    /// Something happened to a target or a run of the open session.
+    /// Adds a note about a target or a run of the open session.
     pub(crate) fn note_of_session(&mut self, text: impl Into<String>) {
         self.note(text);
         if let Some(last) = self.list.last_mut() {
@@ -89,7 +89,7 @@ impl Messages {
         }
     }
 
-    /// Something was begun that ends with the run that is being computed.
+    /// Adds a note that applies only while a run is being computed.
     pub(crate) fn note_while_running(&mut self, text: impl Into<String>) {
         self.note_of_session(text);
         if let Some(last) = self.list.last_mut() {
@@ -97,37 +97,37 @@ impl Messages {
         }
     }
 
-    /// No run is being computed any more.
+    /// Marks the notes about running computations as past.
     pub(crate) fn runs_ended(&mut self) {
         self.list.iter_mut().filter(|message| message.is_of_running).for_each(|m| m.is_past = true);
     }
 
-    /// Forgets the notes about targets and runs: another session is open.
+    /// Removes the notes about targets and runs: another session is open.
     pub(crate) fn forget_session(&mut self) {
         self.list.retain(|message| !message.is_of_session);
     }
 
-    /// Something happened as asked, and there is a page to it.
+    /// Adds a note with a link to a related page.
     pub(crate) fn note_with_link(&mut self, text: impl Into<String>, link: impl Into<String>) {
         self.add(Weight::Note, text.into(), None, Some(link.into()));
     }
 
-    /// Something was refused or failed.
+    /// Adds a problem: an action was refused or failed.
     pub fn problem(&mut self, text: impl Into<String>, hint: Option<String>) {
         self.add(Weight::Problem, text.into(), hint, None);
     }
 
-    /// Something was done that can be taken back as long as no other deed follows.
-    pub fn deed(&mut self, text: impl Into<String>, deed: u64) {
+    /// Adds a note that offers to undo a change.
+    pub fn note_with_undo(&mut self, text: impl Into<String>, change: u64) {
         self.add(Weight::Note, text.into(), None, None);
         if let Some(last) = self.list.last_mut() {
-            last.deed = Some(deed);
+            last.change = Some(change);
         }
     }
 
-    /// The server refused `asked`; `has_card` says whether that is shown above the panels.
-    pub fn refused(&mut self, problem: &Problem, asked: String, has_card: bool) {
-        let mut details = vec![("asked", asked)];
+    /// The server refused `request`; `has_card`: also show it as a card above the panels.
+    pub fn refused(&mut self, problem: &Problem, request: String, has_card: bool) {
+        let mut details = vec![("asked", request)];
         details.extend(problem.field().map(|field| ("field", field.to_owned())));
         if let Some(received) = &problem.received {
             details.push(("request", received.request_id.clone()));
@@ -137,7 +137,7 @@ impl Messages {
         self.about(problem.detail.clone(), problem.hint.clone(), problem.code.clone(), details, has_card);
     }
 
-    /// A file cannot be opened; the sentence names it and says what to do.
+    /// A file cannot be opened; the sentence names it and says how to resolve the problem.
     pub(crate) fn refused_file(&mut self, sentence: impl Into<String>) {
         self.about(sentence.into(), None, "file".to_owned(), Vec::new(), true);
     }
@@ -152,7 +152,7 @@ impl Messages {
     ) {
         self.add(Weight::Problem, text, hint, None);
         if let Some(last) = self.list.last_mut() {
-            // Of the same problem twice the newest request is the one to look for.
+            // For a repeated problem, keep the details of the newest request.
             last.about = Some(Box::new(About { code, details }));
             if has_card {
                 self.card = Some(last.id);
@@ -165,31 +165,31 @@ impl Messages {
         self.list.iter().find(|message| Some(message.id) == self.card)
     }
 
-    /// Closes the card; the message stays.
+    /// Closes the card; the message remains in the list.
     pub(crate) fn close_card(&mut self) {
         self.card = None;
     }
 
-    /// Takes a message away.
+    /// Removes a message.
     pub(crate) fn dismiss(&mut self, id: u64) {
         self.list.retain(|message| message.id != id);
     }
 
-    /// All of them, the newest last.
+    /// All messages, newest last.
     pub fn all(&self) -> &[Message] {
         &self.list
     }
 
-    /// The newest, unless it no longer applies.
+    /// The newest message, unless it is past.
     pub fn newest(&self) -> Option<&Message> {
         self.list.last().filter(|message| !message.is_past)
     }
 
-    /// A request succeeded or is tried again: problems of the same request no longer apply, and a card of one is closed.
-    pub(crate) fn mended(&mut self, asked: &str) {
+    /// Marks the problems of a request as past and closes their card: the request succeeded or is retried.
+    pub(crate) fn mark_resolved(&mut self, request: &str) {
         let is_of = |message: &Message| {
             let details = message.about.iter().flat_map(|about| &about.details);
-            details.into_iter().any(|(name, value)| *name == "asked" && value == asked)
+            details.into_iter().any(|(name, value)| *name == "asked" && value == request)
         };
         for message in self.list.iter_mut().filter(|message| is_of(message)) {
             message.is_past = true;
@@ -197,7 +197,7 @@ impl Messages {
         }
     }
 
-    /// Another session was opened: notes about the earlier one, and what was refused there, no longer apply.
+    /// Marks notes and refusals as past: another session was opened.
     pub(crate) fn leave_session(&mut self) {
         let is_refused = |message: &Message| {
             let details = message.about.iter().flat_map(|about| &about.details);
@@ -215,7 +215,7 @@ impl Messages {
             last.link = link.or(last.link.take());
             return;
         }
-        let (id, about, deed) = (self.next, None, None);
+        let (id, about, change) = (self.next, None, None);
         self.list.push(Message {
             id,
             weight,
@@ -224,7 +224,7 @@ impl Messages {
             link,
             count: 1,
             about,
-            deed,
+            change,
             is_of_session: false,
             is_of_running: false,
             is_past: false,
@@ -266,9 +266,9 @@ mod tests {
         };
         let mut messages = Messages::default();
         messages.refused(&problem, "post /studies/jobs".to_owned(), true);
-        messages.mended("post /sessions");
+        messages.mark_resolved("post /sessions");
         assert!(messages.newest().is_some() && messages.card().is_some());
-        messages.mended("post /studies/jobs");
+        messages.mark_resolved("post /studies/jobs");
         assert!(messages.newest().is_none() && messages.card().is_none());
         assert_eq!(messages.all().len(), 1, "the list keeps it");
         messages.refused(&problem, "post /studies/jobs".to_owned(), true);

@@ -1,33 +1,33 @@
-//! What is known and what is looked at: the one value of which every panel is a view.
+//! The application state: all loaded data, the selection and the views. Every panel displays it.
 //!
-//! Three things change it: commands of the person (`apply`), answers of the server (`arrive`) and its events.
-//! What it wants from the server or the page it returns as effects (`effect`); it does no input or output itself.
+//! It is changed by commands of the user (`apply`), and by replies (`replies`) and events of the server. It does no input or
+//! output itself, but returns effects (`effect`).
 
 mod apply;
-mod arrive;
+mod replies;
 pub(crate) mod effect;
 pub(crate) mod calculator;
 mod camera;
 pub(crate) mod calls;
 mod configurations;
-pub(crate) mod deeds;
+pub(crate) mod undoable;
 mod draft;
 mod linked;
 mod rows;
 mod sync;
 mod views;
-mod known;
+mod sync_state;
 pub(crate) mod messages;
-mod missing;
+mod empty_states;
 mod panels;
-pub(crate) mod pointed;
+pub(crate) mod hovered;
 pub(crate) mod targets;
 pub(crate) mod tracker;
 mod undo;
-mod wanted;
+mod prefetch;
 
-pub(crate) use self::known::{Place, Progress, Refusal};
 pub(crate) use self::rows::{events, row_of, run_letter, state_of};
+pub(crate) use self::sync_state::{ImagePosition, Progress, Refusal};
 pub(crate) use self::views::Views;
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
@@ -49,13 +49,13 @@ use sightline_track::trace::ArrayName;
 use self::calculator::Calculator;
 use self::camera::ChosenCamera;
 use self::configurations::Configurations;
-use self::deeds::Undo;
 use self::effect::{Effect, Outbox};
-use self::known::Sync;
 use self::messages::Messages;
+use self::sync_state::Sync;
 use self::targets::Renaming;
-use crate::breakpoints::Asking;
-use crate::cache::{Cache, Eye, Key, Slot, StepKey};
+use self::undoable::Undo;
+use crate::breakpoints::BreakpointState;
+use crate::cache::{Cache, ImageSide, Key, Slot, StepKey};
 use crate::command::{Layer, Mode, Stage, Zoomable};
 use crate::compare::Compare;
 use crate::drawing::raster::Raster;
@@ -64,128 +64,129 @@ use crate::drawing::view2d::View2d;
 use crate::driving::Driving;
 use crate::exports::Exports;
 use crate::files::Files;
+use crate::hovered::Hovered;
 use crate::net::calls::Calls;
 use crate::net::events::Connection;
 use crate::notes::Notes;
-use crate::pointed::Pointed;
 use crate::shape_view::ShapeView;
 use crate::studies::Studies;
 use crate::tables::FeatureView;
-use crate::theme::Looks;
+use crate::theme::ColourTheme;
 use crate::tour::Tour;
 use crate::trackability::Trackability;
 use crate::why::Why;
 
-/// Everything that is known and looked at.
+/// The application state.
 pub struct State {
-    /// Where the server is, without a slash at the end.
+    /// Base URL of the server, without a trailing slash.
     pub origin: String,
-    /// How the server's events come in.
+    /// State of the event connection.
     pub connection: Connection,
-    /// The traverses that the server has; none before it has said.
+    /// The traverses on the server; `None` until loaded.
     pub traverses: Option<Vec<TraverseEntry>>,
-    /// The traverse that is open.
+    /// The open traverse.
     pub traverse: Option<TraverseView>,
-    /// The session that is open.
+    /// The open session.
     pub session: Option<SessionView>,
     /// Every setting.
     pub settings: Vec<SettingInfo>,
     /// The named configurations.
     pub configurations: Configurations,
-    /// What is looked at; ahead of the server's cursor by the time of a request.
+    /// The selected step, target and run; ahead of the server's cursor while a request is pending.
     pub cursor: Cursor,
-    /// The stage that was chosen last, perhaps in a run of another tracker: what is looked at is [`State::stage`].
+    /// The stage chosen last, possibly of another tracker. [`State::stage`] is the selected one.
     pub stage: Stage,
-    /// What pointer and keys mean.
+    /// The meaning of pointer and keys.
     pub mode: Mode,
     /// Changed settings that no run uses yet.
     pub draft: Changes,
-    /// What was loaded.
+    /// The loaded items.
     pub cache: Cache,
-    /// Runs that go on, by target and run.
+    /// Progress of the runs that are being computed, by target and run.
     pub progress: BTreeMap<(usize, usize), Progress>,
-    /// Stops rendered, and stops in all, while rendering goes on.
+    /// Number of rendered stops and of all stops; `None` when no rendering is under way.
     pub rendering: Option<(usize, usize)>,
-    /// A designation that waits for its answer.
-    pub designating: Option<Place>,
+    /// The designation that awaits its reply.
+    pub designating: Option<ImagePosition>,
     /// The last designation that was advised against or refused.
     pub refusal: Option<Refusal>,
-    /// The name of a target that is being typed.
+    /// The open field for a target's name.
     pub renaming: Option<Renaming>,
-    /// The target that is designated again at the cursor's stop.
+    /// The target that is being designated again at the cursor's stop.
     pub repicks: Option<usize>,
     /// The targets whose marks are hidden in the images.
     pub hidden_targets: BTreeSet<usize>,
-    /// The colours that the user gave targets, by their numbers; the others are grey.
+    /// Index of the colour that the user gave a target, by target number; other targets are grey.
     pub target_colours: BTreeMap<usize, usize>,
-    /// What was said to the person.
+    /// Messages to the user.
     pub messages: Messages,
-    /// What each panel shows.
+    /// The visible region of each image.
     pub views: Views,
-    /// The camera of the stops that a person chose for the images.
+    /// The user's choice of a camera.
     pub(crate) chosen_camera: Option<ChosenCamera>,
-    /// How the images' grey values become brightness on the screen.
+    /// Mapping of the images' grey values to screen brightness.
     pub stretch: Stretch,
-    /// Which features are shown, and how long their residuals are drawn.
+    /// Filter of the features, and magnification of their residuals.
     pub feature_view: FeatureView,
-    /// What is looked at of a registration by shape.
+    /// The selection in the shape panel.
     pub shape_view: ShapeView,
-    /// What the calculator of the error budget is given.
+    /// Inputs of the calculator of the error budget.
     pub calculator: Calculator,
     /// The validation experiments.
     pub studies: Studies,
-    /// Whether the windows of all steps are on the screen.
+    /// Whether a visible panel shows the matched windows of all steps.
     pub wants_history: bool,
-    /// Whether a panel shows the corners of visual odometry.
+    /// Whether a visible panel shows the corners of visual odometry.
     pub(crate) wants_odometry: bool,
-    /// Whether a panel on the screen shows the goodness map.
+    /// Whether a visible panel shows the goodness map.
     pub(crate) wants_hazards: bool,
-    /// Layers of marks that are switched off.
+    /// Hidden layers of marks.
     pub hidden: HashSet<Layer>,
-    /// Whether marks are shown at all.
+    /// Whether any marks are shown.
     pub marks: bool,
-    /// Which colours the page has.
-    pub looks: Looks,
+    /// The colour scheme of the page.
+    pub colour_theme: ColourTheme,
     /// Whether keys that write a character act without Ctrl.
     pub single_keys: bool,
-    /// Runs that are compared with the one looked at.
+    /// The comparison of the selected run with others.
     pub compare: Compare,
-    /// How well a target would do at the stop that is looked at.
+    /// The trackability map of the cursor's stop.
     pub trackability: Trackability,
-    /// The drive on commands, and the command in its form.
+    /// The commanded drive, and the command being entered.
     pub driving: Driving,
-    /// Where the tour is.
+    /// State of the tour.
     pub tour: Tour,
-    /// Why a step came out as it did, what would have saved it, and what is tried.
+    /// Explanations of a step, its counterfactuals, and the trial.
     pub why: Why,
-    /// What can be taken back.
+    /// The changes that can be undone and redone.
     pub undo: Undo,
-    /// What a person wrote about places of the drive.
+    /// The user's notes on the drive.
     pub notes: Notes,
-    /// What the session can be had as.
+    /// The window of exports.
     pub exports: Exports,
-    /// What can be opened.
+    /// The window of files.
     pub files: Files,
-    /// Breakpoints, derived columns, and time travel.
-    pub ask: Asking,
-    /// Panels that are looked at as tables.
+    /// Breakpoints, derived columns, and playback.
+    pub breakpoints: BreakpointState,
+    /// Panels that are shown as tables.
     pub tables: HashSet<crate::panels::pane::Pane>,
-    /// What the pointer rests on, in whatever panel.
-    pub pointed: Option<Pointed>,
+    /// The hovered location, in any panel.
+    pub hovered: Option<Hovered>,
     pub(crate) outbox: Outbox,
     calls: Calls<State>,
     pub(crate) sync: Sync,
-    /// The aligned left camera of the step that was asked for last: it takes a while to compute.
+    /// Aligned left camera of the step that was requested last, cached because it is slow to compute.
     aligned: egui::mutex::Mutex<Option<(StepKey, Option<Camera>)>>,
-    /// Settings of the run that was asked about last, by group and name: reading one writes all of them as a document.
+    /// Values read from the settings of one run, by group and name. Reading a value serialises all settings, so they are
+    /// cached.
     read_out: egui::mutex::Mutex<ReadOut>,
 }
 
-/// Settings, and those of their values that were asked for.
+/// Settings, with the values of them that were read.
 type ReadOut = (Settings, BTreeMap<(String, String), Option<Value>>);
 
 impl State {
-    /// Nothing known yet; `linked` is the session that the page's link names.
+    /// A state without data; `linked` is the session in the page's link.
     pub fn new(origin: String, linked: Option<String>) -> Self {
         Self {
             origin,
@@ -221,7 +222,7 @@ impl State {
             wants_hazards: false,
             hidden: HashSet::from(Layer::HIDDEN_AT_FIRST),
             marks: true,
-            looks: Looks::default(),
+            colour_theme: ColourTheme::default(),
             single_keys: true,
             compare: Compare::default(),
             trackability: Trackability::default(),
@@ -232,9 +233,9 @@ impl State {
             notes: Notes::default(),
             exports: Exports::default(),
             files: Files::default(),
-            ask: Asking::default(),
+            breakpoints: BreakpointState::default(),
             tables: HashSet::new(),
-            pointed: None,
+            hovered: None,
             outbox: Outbox::default(),
             calls: Calls::default(),
             sync: Sync { linked, ..Sync::default() },
@@ -243,46 +244,47 @@ impl State {
         }
     }
 
-    /// How many stops the traverse has.
+    /// Number of stops of the traverse.
     pub fn stop_count(&self) -> usize {
         self.traverse.as_ref().map_or(0, |traverse| traverse.stops.len())
     }
 
-    /// The stop that is looked at.
+    /// The cursor's stop.
     pub fn stop(&self) -> Option<&StopView> {
         self.traverse.as_ref()?.stops.get(self.cursor.step)
     }
 
-    /// The target that is looked at.
+    /// The selected target.
     pub fn target(&self) -> Option<&TargetView> {
         let number = self.cursor.target?;
         self.session.as_ref()?.targets.iter().find(|target| target.number == number)
     }
 
-    /// The run that is looked at.
+    /// The selected run.
     pub fn run(&self) -> Option<&RunView> {
         self.target()?.runs.iter().find(|run| run.number == self.cursor.run)
     }
 
-    /// A step of the run that is looked at, as one line; none before the designation or where it was not computed.
+    /// The row of a step of the selected run; `None` before the designation, or if the step was not computed.
     pub fn row_at(&self, step: usize) -> Option<&StepRow> {
         row_of(self.run()?, step)
     }
 
-    /// The cursor's step as one line.
+    /// The row of the cursor's step.
     pub fn row(&self) -> Option<&StepRow> {
         self.row_at(self.cursor.step)
     }
 
-    /// How the cursor's run goes on, while it does.
+    /// Progress of the selected run while it is being computed.
     pub fn run_progress(&self) -> Option<&Progress> {
         self.progress.get(&(self.cursor.target?, self.cursor.run))
     }
 
-    /// Whether the selected run is still being computed. A page that opens during a run reads rows before its first progress event.
+    /// Whether the selected run is still being computed. A page opened during a run reads rows before its first progress
+    /// event.
     pub(crate) fn is_running(&self) -> bool {
         let is_incomplete =
-            self.run().is_some_and(|run| !run.complete && run.stopped.is_none() && !self.is_held(run));
+            self.run().is_some_and(|run| !run.complete && run.stopped.is_none() && !self.is_paused(run));
         self.run_progress().is_some() || is_incomplete
     }
 
@@ -292,46 +294,46 @@ impl State {
         self.messages.newest().filter(|message| !message.is_of_running || is_running())
     }
 
-    /// The name of a step of the run that is looked at.
+    /// The cache key of a step of the selected run.
     pub fn step_key(&self, step: usize) -> Option<StepKey> {
         let (session, target) = (self.session.as_ref()?, self.target()?);
         Some(StepKey { session: session.id.clone(), target: target.number, run: self.cursor.run, step })
     }
 
-    /// What a step saw and decided.
+    /// The record of a step.
     pub fn trace_at(&self, step: usize) -> Slot<'_, RunStep> {
         self.step_key(step).map_or(Slot::Absent, |key| self.cache.trace(&key))
     }
 
-    /// What the cursor's step saw and decided, once it is here.
+    /// The record of the cursor's step; `None` until loaded.
     pub fn trace(&self) -> Option<&RunStep> {
         self.trace_at(self.cursor.step).ready()
     }
 
-    /// How vision measured the motion to a stop; `None` where it did not.
+    /// The motion to a stop as measured by visual odometry; `None` if it was not measured.
     pub fn measured_motion(&self, step: usize) -> Option<&MeasuredMotion> {
         self.traverse.as_ref()?.stops.get(step)?.odometry.as_ref()
     }
 
-    /// The view of the cursor's step against the earlier templates of its run.
+    /// The comparison of the cursor's step with the earlier templates of its run.
     pub fn earlier_templates(&self) -> Slot<'_, [AgainstEarlier]> {
         let key = self.row().and_then(|_| self.step_key(self.cursor.step));
         key.map_or(Slot::Absent, |key| self.cache.earlier_templates(&key))
     }
 
-    /// The name of an image of a stop, of the camera that is shown; `None` where the stop lacks it.
-    pub fn image_key(&self, step: usize, eye: Eye) -> Option<Key> {
-        self.image_key_in(step, self.camera(), eye)
+    /// The cache key of an image of a stop in the camera that is shown; `None` if the stop lacks it.
+    pub fn image_key(&self, step: usize, side: ImageSide) -> Option<Key> {
+        self.image_key_in(step, self.camera(), side)
     }
 
-    /// The name of the cameras of a stop.
+    /// The cache key of the cameras of a stop.
     pub fn stop_detail_key(&self, step: usize) -> Option<Key> {
         Some(Key::Stop { traverse: self.traverse.as_ref()?.id.clone(), step })
     }
 
     /// An image of the cursor's stop.
-    pub fn image(&self, eye: Eye) -> Slot<'_, Raster> {
-        self.image_key(self.cursor.step, eye).map_or(Slot::Absent, |key| self.cache.raster(&key))
+    pub fn image(&self, side: ImageSide) -> Slot<'_, Raster> {
+        self.image_key(self.cursor.step, side).map_or(Slot::Absent, |key| self.cache.raster(&key))
     }
 
     /// An array of the cursor's step.
@@ -340,20 +342,20 @@ impl State {
         key.map_or(Slot::Absent, |key| self.cache.raster(&key))
     }
 
-    /// A setting of the run that is looked at by its name, for forms that are made from the table of settings.
+    /// A setting of the selected run by group and name, for forms generated from the table of settings.
     ///
-    /// Code that knows the setting reads the field of [`State::run_settings`].
+    /// Code for one particular setting reads the field of [`State::run_settings`].
     pub fn setting(&self, group: &str, key: &str) -> Option<Value> {
         let settings = &self.run()?.settings;
-        let mut kept = self.read_out.lock();
-        if kept.0 != *settings {
-            *kept = (settings.clone(), BTreeMap::new());
+        let mut cached = self.read_out.lock();
+        if cached.0 != *settings {
+            *cached = (settings.clone(), BTreeMap::new());
         }
         let name = (group.to_owned(), key.to_owned());
-        kept.1.entry(name).or_insert_with(|| settings.value(group, key)).clone()
+        cached.1.entry(name).or_insert_with(|| settings.value(group, key)).clone()
     }
 
-    /// The settings of the run that is looked at; the defaults without a run.
+    /// The settings of the selected run; the defaults without a run.
     pub(crate) fn run_settings(&self) -> &Settings {
         static DEFAULTS: LazyLock<Settings> = LazyLock::new(Settings::default);
         self.run().map_or(&DEFAULTS, |run| &run.settings)
@@ -364,16 +366,16 @@ impl State {
         self.marks && !self.hidden.contains(&layer)
     }
 
-    /// The view of a panel.
+    /// The visible region of an image.
     pub fn view(&self, panel: Zoomable) -> View2d {
         match panel {
             Zoomable::Left => self.views.left,
             Zoomable::Right => self.views.right,
-            Zoomable::Surface => self.views.surface,
+            Zoomable::ScoreMap => self.views.score_map,
         }
     }
 
-    /// The latest tracking state of the cursor's step.
+    /// The tracking state at the cursor's step: from its record if loaded, otherwise from its row.
     pub fn tracking(&self) -> Option<TrackingState> {
         if let Some(trace) = self.trace() {
             return Some(trace.update.state);
@@ -381,14 +383,14 @@ impl State {
         self.row().map(state_of)
     }
 
-    /// What answers and events led to, with the requests that bring server and page into step.
+    /// The effects of replies and events, with the requests that synchronise server and page.
     #[must_use = "the page carries the effects out"]
     pub fn take_effects(&mut self) -> Vec<Effect> {
         self.sync_all();
         self.outbox.take()
     }
 
-    /// The requests among these effects; the others keep waiting.
+    /// The requests among these effects; the others remain queued.
     #[cfg(test)]
     pub fn take_requests(&mut self) -> Vec<crate::net::request::Request> {
         self.sync_all();
@@ -399,8 +401,8 @@ impl State {
         self.sync_session();
         self.sync_trackability();
         self.sync_driving();
-        self.sync_tried_drives();
+        self.sync_trial_drives();
         self.sync_tour();
-        self.sync_ask();
+        self.sync_breakpoints();
     }
 }

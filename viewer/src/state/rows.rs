@@ -1,10 +1,10 @@
-//! Rows of a run and the words for them.
+//! Rows of a run, and the words for them.
 
 use sightline_session::step::StepRow;
 use sightline_session::view::RunView;
 use sightline_track::target::TrackingState;
 
-/// A step of a run as one line.
+/// The row of a step of a run.
 pub(crate) fn row_of(run: &RunView, step: usize) -> Option<&StepRow> {
     let first = run.rows.first()?.step;
     run.rows.get(step.checked_sub(first)?)

@@ -1,4 +1,4 @@
-//! What is done to a target in the list: renaming it, hiding its marks, designating it again at another stop.
+//! Actions on a listed target: rename it, hide its marks, designate it again at another stop.
 
 use egui::Color32;
 use sightline_api::endpoint::Call;
@@ -10,33 +10,33 @@ use sightline_track::settings::Changes;
 
 use crate::command::Mode;
 use crate::state::State;
-use crate::state::deeds::Deed;
+use crate::state::undoable::UndoableChange;
 use crate::theme;
 
-/// A request about the name of a target.
+/// A command about the name of a target.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Rename {
-    /// Opens the field of a target.
+    /// Opens the field for a target's name.
     Begin(usize),
-    /// Types a name into the open field.
+    /// Changes the text of the open field.
     Type(String),
-    /// Gives the target the typed name.
+    /// Renames the target and closes the field.
     Save,
     /// Closes the field.
     Cancel,
 }
 
-/// The open field.
+/// The open field for a target's name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Renaming {
     /// The target's number.
     pub target: usize,
-    /// The typed name.
+    /// The text entered so far.
     pub text: String,
 }
 
 impl State {
-    /// Applies a request about a name.
+    /// Applies a command about a name.
     pub(crate) fn rename(&mut self, rename: Rename) {
         match rename {
             Rename::Begin(target) => {
@@ -85,7 +85,7 @@ impl State {
         };
     }
 
-    /// The colour of a target's marks where it is not selected: grey unless the user chose another.
+    /// The colour of the marks of an unselected target: grey unless the user chose another.
     pub(crate) fn colour_of(&self, target: usize) -> Color32 {
         self.target_colours.get(&target).map_or_else(theme::weak, |colour| theme::run(*colour))
     }
@@ -95,14 +95,14 @@ impl State {
         self.repicks = self.target_numbered(target).map(|target| target.number);
     }
 
-    /// Label and settings of the target that is designated again at a stop: those of its newest run.
+    /// Label and settings of the target that is designated again at a stop; the settings are those of its newest run.
     pub(super) fn repicked(&self, step: usize) -> Option<(String, Changes)> {
         let target = self.target_numbered(self.repicks?)?;
         let settings = target.runs.last().map(|run| run.changes.clone()).unwrap_or_default();
         Some((format!("{}, from stop {step}", target.label), settings))
     }
 
-    /// Gives a target a name; with its former name the change can be undone.
+    /// Renames a target; with its former name, the change can be undone.
     pub(super) fn rename_target(&mut self, target: usize, label: String, before: Option<String>) {
         let Some(session) = self.session_id() else { return };
         let call = Call::with_body::<RenameTarget>(&AtTarget { session, target }, &TargetLabel { label });
@@ -115,7 +115,7 @@ impl State {
             if let Some(before) = before
                 && let Some(after) = state.label_of(target)
             {
-                state.did(Deed::Renamed { target, before, after });
+                state.record_change(UndoableChange::Renamed { target, before, after });
             }
         });
     }

@@ -1,4 +1,4 @@
-//! What the run that is looked at was tracked with, and what only one of the trackers has.
+//! The settings of the selected run, and the evidence that only one of the trackers records.
 
 use sightline_geometry::camera::Camera;
 use sightline_session::step::StepRow;
@@ -12,7 +12,7 @@ use sightline_track::trace::ArrayName;
 use sightline_vision::stereo::{AlignSettings, Alignment};
 
 use crate::cache::{Key, Slot};
-use crate::command::{Extent, Stage};
+use crate::command::{Stage, StageBarExtent};
 use crate::state::State;
 use crate::tables::Table;
 
@@ -22,28 +22,30 @@ impl State {
         self.run_settings().template.template_size_px
     }
 
-    /// The tracker of the run that is looked at; without a run the default.
+    /// The tracker of the selected run; the default without a run.
     pub fn tracker(&self) -> TrackerKind {
         self.run().map_or_else(TrackerKind::default, |run| run.settings.tracker)
     }
 
-    /// The selected stage, in the words of the tracker.
+    /// The selected stage, mapped to one that the tracker and the drive have.
     pub fn stage(&self) -> Stage {
         let stage = self.stage.of_tracker(self.tracker());
         match (stage, self.extent()) {
-            (Stage::VISUAL_ODOMETRY, Extent::Tracker) => Stage::PREDICT,
-            (of_drive, Extent::Tracker | Extent::Odometry) if of_drive.is_of_drive() => Stage::UPDATE,
+            (Stage::VISUAL_ODOMETRY, StageBarExtent::Tracker) => Stage::PREDICT,
+            (of_drive, StageBarExtent::Tracker | StageBarExtent::Odometry) if of_drive.is_of_drive() => {
+                Stage::UPDATE
+            }
             _ => stage,
         }
     }
 
-    /// Which stages the bar has beside those of the tracker.
-    pub(crate) fn extent(&self) -> Extent {
+    /// The stages that the stage bar has in addition to the tracker's.
+    pub(crate) fn extent(&self) -> StageBarExtent {
         let stops = || self.traverse.iter().flat_map(|traverse| &traverse.stops);
         match self.is_on_commands() {
-            true => Extent::Drive,
-            false if stops().any(|stop| stop.odometry.is_some()) => Extent::Odometry,
-            false => Extent::Tracker,
+            true => StageBarExtent::Drive,
+            false if stops().any(|stop| stop.odometry.is_some()) => StageBarExtent::Odometry,
+            false => StageBarExtent::Tracker,
         }
     }
 
@@ -52,7 +54,7 @@ impl State {
         Stage::bar(self.tracker(), self.extent())
     }
 
-    /// What the feature tracker saw at the cursor's step.
+    /// The feature tracker's evidence at the cursor's step.
     pub fn feature_evidence(&self) -> Option<&FeatureEvidence> {
         self.trace().and_then(|trace| trace.features())
     }
@@ -65,7 +67,7 @@ impl State {
         })
     }
 
-    /// Where the bootstrap puts the target at the cursor's step.
+    /// The bootstrap distribution of the target at the cursor's step.
     pub fn cloud(&self) -> Slot<'_, Vec<CloudPoint>> {
         self.table(ArrayName::CLOUD, |table| match table {
             Table::Cloud(rows) => Some(rows),
@@ -73,7 +75,7 @@ impl State {
         })
     }
 
-    /// The way of the refinement at the cursor's step.
+    /// The iterations of the refinement at the cursor's step.
     pub fn refine_path(&self) -> Slot<'_, Vec<PathStep>> {
         self.table(ArrayName::REFINE_PATH, |table| match table {
             Table::Path(rows) => Some(rows),
@@ -89,22 +91,22 @@ impl State {
         })
     }
 
-    /// What the shape tracker saw at the cursor's step.
+    /// The shape tracker's evidence at the cursor's step.
     pub fn shape_evidence(&self) -> Option<&ShapeEvidence> {
         self.trace().and_then(|trace| trace.shape())
     }
 
-    /// The aligned left camera of the cursor's step, in which surfaces are measured.
+    /// The aligned left camera of the cursor's step, in which dense stereo is computed.
     pub fn aligned_left(&self) -> Option<Camera> {
         let key = self.step_key(self.cursor.step)?;
-        let mut kept = self.aligned.lock();
-        if let Some((_, camera)) = kept.as_ref().filter(|(of, _)| *of == key) {
+        let mut cached = self.aligned.lock();
+        if let Some((_, camera)) = cached.as_ref().filter(|(of, _)| *of == key) {
             return camera.clone();
         }
         let pointing = &self.trace()?.point_mast;
         let aligned = Alignment::new(&pointing.left, &pointing.right, &AlignSettings::default());
         let camera = aligned.ok().map(|aligned| aligned.left);
-        *kept = Some((key, camera.clone()));
+        *cached = Some((key, camera.clone()));
         camera
     }
 
@@ -113,7 +115,7 @@ impl State {
         key.map_or(Slot::Absent, |key| self.cache.table(&key).and(of))
     }
 
-    /// Why a panel about the template has nothing to show, as a sentence that says where to look.
+    /// Why a panel about the template is empty, and which panel to use.
     pub(crate) fn missing_template(&self) -> String {
         match (self.tracker(), self.row()) {
             (TrackerKind::Shape, Some(_)) => {
@@ -130,7 +132,7 @@ impl State {
         }
     }
 
-    /// Why a panel about features has nothing to show, as a sentence that says how to get them.
+    /// Why a panel about features is empty, and how to get them.
     pub(crate) fn missing_features(&self) -> String {
         match (self.tracker(), self.row()) {
             (TrackerKind::Shape, Some(_)) => {
@@ -146,7 +148,7 @@ impl State {
         }
     }
 
-    /// Why a panel about the shape has nothing to show, as a sentence that says how to get it.
+    /// Why a panel about the shape is empty, and how to get it.
     pub(crate) fn missing_shape(&self) -> String {
         match (self.tracker(), self.row()) {
             (TrackerKind::Template | TrackerKind::Features, Some(_)) => {
@@ -159,7 +161,7 @@ impl State {
     }
 }
 
-/// The feature tracker's confidence in a step; the designation, by point stereo, has none of its own.
+/// The feature tracker's confidence in a step; `None` at the designation, which uses point stereo.
 pub(crate) fn confidence_of(run: &RunView, row: &StepRow) -> Option<f64> {
     let is_pick = run.rows.first().is_some_and(|first| first.step == row.step);
     row.confidence.filter(|_| run.settings.tracker != TrackerKind::Template && !is_pick)

@@ -1,5 +1,4 @@
-//! The result of a study as a plot: the share of targets that were tracked over the study's variable, for each
-//! configuration.
+//! The result of a study as a plot: the percentage of tracked targets against the study's variable, for each configuration.
 
 use std::collections::BTreeMap;
 
@@ -9,20 +8,20 @@ use sightline_study::row::Row;
 
 use crate::drawing::overlay::Mark;
 use crate::panels::chart::{few_marks, plain};
-use crate::panels::names;
+use crate::panels::chart_legend;
 use crate::theme;
 
-/// The curve of one configuration: place of the variable's value on the x axis, and share of targets tracked, %.
+/// The curve of one configuration: index of the variable's value on the x axis, and tracked targets, %.
 type Curve = Vec<[f64; 2]>;
 
-/// Curves by configuration, with the values of the x axis.
+/// Curves by configuration, with the tick labels of the x axis.
 #[derive(Debug, Default, PartialEq)]
 struct Curves {
     values: Vec<String>,
     lines: Vec<(String, Curve)>,
 }
 
-/// Shows the plot; nothing where the rows do not count targets.
+/// Shows the plot; nothing if the rows do not count targets.
 pub(super) fn show(ui: &mut Ui, rows: &[Row], variable: &str, id: &str) {
     let Curves { values, lines } = curves(rows, variable);
     if lines.is_empty() {
@@ -30,7 +29,7 @@ pub(super) fn show(ui: &mut Ui, rows: &[Row], variable: &str, id: &str) {
     }
     let legend: Vec<_> =
         lines.iter().enumerate().map(|(at, (name, _))| (Mark::Ring, theme::run(at), name.clone())).collect();
-    names::wrapped(ui, "targets tracked, %", &legend);
+    chart_legend::wrapped(ui, "targets tracked, %", &legend);
     let axis = variable.replace('_', " ");
     let (of_axis, of_hover, name) = (values.clone(), values.clone(), axis.clone());
     let plot = Plot::new(("study", id.to_owned()))
@@ -68,7 +67,7 @@ pub(super) fn show(ui: &mut Ui, rows: &[Row], variable: &str, id: &str) {
     });
 }
 
-/// The value at a place of the x axis; empty between two values.
+/// The tick label at a position on the x axis; empty between two values.
 fn named(values: &[String], place: f64) -> String {
     let at = place.round();
     let is_whole = (place - at).abs() < 1e-6 && at >= 0.0;

@@ -1,18 +1,18 @@
-//! How long a study takes: before it starts from its size, while it runs from the share that is done.
+//! The duration of a study: before its start from its size, while it runs from the completed fraction.
 
 use sightline_study::wire::{NewStudy, StudyInfo, StudyJob, StudyState};
 
 use crate::panels::numbers::counted as count;
 use crate::studies::WORLDS;
 
-/// Time for a world with its images on two cores, s; measured jobs of this server replace it.
+/// Time for a world with its images on two cores, s; replaced by measured jobs of this server.
 const WORLD_S: f64 = 15.0;
 /// Time for one configuration at one point in one world on two cores, s.
 const UNIT_S: f64 = 5.0;
-/// Share from which the time left is worth showing.
+/// Minimum completed fraction for which the remaining time is shown.
 const SHARE_MIN: f64 = 0.03;
 
-/// Size and duration of a study that is not started yet.
+/// Size and duration of a study that has not been started.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Estimate {
     /// Number of configurations.
@@ -26,7 +26,7 @@ pub(super) struct Estimate {
 }
 
 impl Estimate {
-    /// The estimate for a request; `jobs` are the earlier studies of this server.
+    /// The estimate for a request; `jobs` are the earlier studies on this server.
     pub(super) fn of(new: &NewStudy, info: &StudyInfo, jobs: &[StudyJob]) -> Self {
         let values = if new.grid.is_empty() { info.grid.len() } else { new.grid.len() };
         let worlds =
@@ -41,12 +41,12 @@ impl Estimate {
         Self { configurations: new.configurations.len(), points, worlds, seconds }
     }
 
-    /// Number of runs of all targets of a world.
+    /// Number of runs; one run covers all targets of a world.
     pub(super) fn units(&self) -> usize {
         self.configurations * self.points * self.worlds
     }
 
-    /// The estimate as one line.
+    /// The estimate on one line.
     pub(super) fn words(&self) -> String {
         format!(
             "{} × {} × {} = {}, about {} if nothing else is computed",
@@ -59,15 +59,15 @@ impl Estimate {
     }
 }
 
-/// Time per unit of the latest study of that name that is done, s.
+/// Time per unit of the latest completed study with this name, s.
 fn measured(jobs: &[StudyJob], study: &str) -> Option<f64> {
     let is_done = |job: &&StudyJob| job.study == study && job.state == StudyState::Done && job.n > 0;
     let done = jobs.iter().rev().find(is_done)?;
-    // Units of an earlier study cost nothing: a study of a few seconds only read them.
+    // Units of an earlier study are reused: a study of a few seconds only read them.
     (done.seconds > 10.0).then(|| done.seconds / done.n as f64)
 }
 
-/// Time left of a running study; `None` while too little is done.
+/// Remaining time of a running study; `None` if too little is completed.
 pub(super) fn left(job: &StudyJob) -> Option<String> {
     let is_known = job.state == StudyState::Running && job.share >= SHARE_MIN && job.share < 1.0;
     is_known.then(|| format!("about {} left", duration(job.seconds * (1.0 - job.share) / job.share)))
@@ -140,7 +140,7 @@ mod tests {
             scenarios: vec!["approach-5".to_owned()],
             points_per_value: 1,
         };
-        let new = crate::studies::Order::default().request(&info).unwrap();
+        let new = crate::studies::StudyForm::default().request(&info).unwrap();
         let first = Estimate::of(&new, &info, &[]);
         assert_eq!(first.units(), 10);
         assert_eq!(

@@ -1,4 +1,4 @@
-//! The validation experiments: which there are, which were started, and what is to be started next.
+//! The validation studies: those available, those started, and the form for the next one.
 
 pub(crate) mod panel;
 pub(crate) mod update;
@@ -14,56 +14,56 @@ use sightline_study::plan::Plan;
 use sightline_study::row::Row;
 use sightline_study::wire::{NewStudy, StudyInfo, StudyJob};
 
-/// What is known of studies.
+/// State of the studies.
 #[derive(Clone, Debug, Default)]
 pub struct Studies {
-    /// Those that can be started; none before the server has said.
+    /// The available studies; `None` until received.
     pub infos: Option<Vec<StudyInfo>>,
-    /// Those that were started, in the server's order.
+    /// The started studies, in the server's order.
     pub jobs: Vec<StudyJob>,
-    /// The tables that were asked for, by job.
+    /// The tables that were read, by job.
     pub rows: BTreeMap<String, Vec<Row>>,
-    /// The job whose table is looked at.
-    pub looked: Option<String>,
-    /// What the next study is made of.
-    pub order: Order,
-    /// The jobs whose end was requested and is not here yet: a unit of work that has begun is completed first.
+    /// The job whose table is shown.
+    pub shown_job: Option<String>,
+    /// The inputs of the next study.
+    pub form: StudyForm,
+    /// The jobs whose cancellation was requested and is pending; a unit of work in progress is completed first.
     pub cancelling: BTreeSet<String>,
-    is_asked: bool,
+    is_requested: bool,
 }
 
-/// What the next study is made of, as the person types it.
+/// The inputs of the next study, as text in the form.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Order {
-    /// The study's name; empty stands for the first.
+pub struct StudyForm {
+    /// The study's name; empty: the first study.
     pub study: String,
-    /// Seeds with commas between them; empty: [`WORLDS`] worlds from seed 1 on.
+    /// Comma-separated seeds; empty: [`WORLDS`] worlds from seed 1 on.
     pub seeds: String,
-    /// Configurations with commas between them; empty: [`Order::proposed`].
+    /// Comma-separated configurations; empty: [`StudyForm::proposed`].
     pub configurations: String,
-    /// Values of the study's variable with commas between them; empty: its own.
+    /// Comma-separated values of the study's variable; empty: its default values.
     pub grid: String,
 }
 
-/// Number of worlds of a study whose seeds are not given.
+/// Number of worlds of a study without given seeds.
 pub(crate) const WORLDS: u64 = 2;
 
-/// Configurations that a study begins with, where it has them: ours and the paper's three.
+/// Configurations that a study proposes, if it has them: ours and the paper's three.
 const FIRST: [&str; 4] = ["sightline", "ncc-scale-roll", "ncc-scale", "ncc"];
 
-impl Order {
-    /// The configurations that are run where none are given: few, so that the first result comes soon.
+impl StudyForm {
+    /// The default configurations: few, so that the first result arrives soon.
     pub(crate) fn proposed(info: &StudyInfo) -> Vec<String> {
         let has = |name: &&&str| info.configurations.iter().any(|known| known == **name);
         let first: Vec<String> = FIRST.iter().filter(has).map(|&name| name.to_owned()).collect();
         if first.is_empty() { info.configurations.iter().take(FIRST.len()).cloned().collect() } else { first }
     }
 
-    /// The request that starts a study.
+    /// The request that starts the study.
     ///
     /// # Errors
-    /// A sentence that names the field, if a seed is not a whole number, a configuration is not known, or a value is no point of the
-    /// grid.
+    /// A sentence that names the field, if a seed is not an integer, a configuration is unknown, or a value is not a point
+    /// of the grid.
     pub fn request(&self, info: &StudyInfo) -> Result<NewStudy, String> {
         let words = |text: &str| -> Vec<String> {
             text.split(',').map(|word| word.trim().to_owned()).filter(|word| !word.is_empty()).collect()
@@ -75,7 +75,7 @@ impl Order {
         let seeds: Vec<u64> = words(&self.seeds).iter().map(seed).collect::<Result<_, _>>()?;
         let configurations = words(&self.configurations);
         let grid = words(&self.grid);
-        // The server's own check, with the names of this form.
+        // The same check as on the server, with the field names of this form.
         if !(configurations.is_empty() && grid.is_empty()) {
             Plan::new(&info.name, &configurations, &grid).map_err(|error| match error {
                 Error::Setting { key, problem } if key == "grid" => format!("{}: {problem}", info.variable),
@@ -96,14 +96,14 @@ impl Order {
 }
 
 impl Studies {
-    /// The study that the order names, else the first.
+    /// The study that the order names, otherwise the first.
     pub fn chosen(&self) -> Option<&StudyInfo> {
         let infos = self.infos.as_ref()?;
-        infos.iter().find(|info| info.name == self.order.study).or(infos.first())
+        infos.iter().find(|info| info.name == self.form.study).or(infos.first())
     }
 
-    /// Stores the state of a job, unless a newer one is known: answers and events overtake each other.
-    pub(crate) fn took(&mut self, job: StudyJob) {
+    /// Stores the state of a job, unless a newer one is stored: replies and events can overtake each other.
+    pub(crate) fn store_job(&mut self, job: StudyJob) {
         match self.jobs.iter_mut().find(|known| known.id == job.id) {
             Some(known) if known.revision > job.revision => {}
             Some(known) => *known = job,
@@ -112,14 +112,14 @@ impl Studies {
     }
 
     /// Stores the server's list of jobs.
-    pub(crate) fn took_all(&mut self, list: Vec<StudyJob>) {
+    pub(crate) fn set_jobs(&mut self, list: Vec<StudyJob>) {
         self.jobs.retain(|known| list.iter().any(|job| job.id == known.id));
-        list.into_iter().for_each(|job| self.took(job));
+        list.into_iter().for_each(|job| self.store_job(job));
     }
 
-    /// Requests everything again from a server that may have been restarted, and so counts revisions anew.
+    /// Requests everything again from a server that may have been restarted and restarted its revision numbers.
     pub(crate) fn make_stale(&mut self) {
-        self.is_asked = false;
+        self.is_requested = false;
         self.cancelling.clear();
         self.jobs.iter_mut().for_each(|job| job.revision = 0);
     }
@@ -130,7 +130,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_order_becomes_a_request_and_a_wrong_seed_a_sentence() {
+    fn a_study_form_becomes_a_request_or_a_sentence() {
         let info = StudyInfo {
             name: "straight".to_owned(),
             question: String::new(),
@@ -141,18 +141,18 @@ mod tests {
             scenarios: Vec::new(),
             points_per_value: 1,
         };
-        let order = Order {
+        let form = StudyForm {
             seeds: "7, 8".to_owned(),
             configurations: "ncc-scale, ncc+scale=true".to_owned(),
-            ..Order::default()
+            ..StudyForm::default()
         };
-        let new = order.request(&info).unwrap();
+        let new = form.request(&info).unwrap();
         assert_eq!((new.study.as_str(), new.seeds, new.worlds), ("straight", vec![7, 8], None));
         assert_eq!(new.configurations, ["ncc-scale", "ncc+scale=true"]);
         assert!(new.grid.is_empty());
-        let wrong = Order { seeds: "7,x".to_owned(), ..Order::default() };
+        let wrong = StudyForm { seeds: "7,x".to_owned(), ..StudyForm::default() };
         assert!(wrong.request(&info).unwrap_err().contains("x is not a whole number"));
-        let small = Order::default().request(&info).unwrap();
+        let small = StudyForm::default().request(&info).unwrap();
         assert_eq!(small.worlds, Some(WORLDS), "few worlds");
         assert_eq!(small.configurations, ["sightline", "ncc-scale", "ncc"], "few configurations");
     }

@@ -1,4 +1,4 @@
-//! The validation experiments as jobs: choose one, start it, watch it, read its table and its report.
+//! The validation studies as jobs: choose one, start it, follow its progress, read its table and its report.
 
 use egui::{ComboBox, Grid, RichText, ScrollArea, TextEdit, Ui, vec2};
 use sightline_study::wire::{StudyInfo, StudyJob, StudyState};
@@ -10,7 +10,7 @@ use crate::panels::pane::Need;
 use crate::panels::panel::Panel;
 use crate::state::State;
 use crate::studies::estimate::{self, Estimate};
-use crate::studies::{Order, WORLDS, table};
+use crate::studies::{StudyForm, WORLDS, table};
 use crate::{panels, theme};
 
 /// The panel “Studies”.
@@ -61,15 +61,15 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 }
 
 fn form(ui: &mut Ui, state: &State, chosen: &StudyInfo, out: &mut Vec<Command>) {
-    let mut order = state.studies.order.clone();
+    let mut form = state.studies.form.clone();
     ui.horizontal(|ui| {
         ui.label(theme::label("study"));
         let choice = ComboBox::from_id_salt("study").width(150.0).selected_text(&chosen.name);
         let shown = choice.show_ui(ui, |ui| {
             for info in state.studies.infos.iter().flatten() {
-                let is_chosen = order.study == info.name;
+                let is_chosen = form.study == info.name;
                 if panels::entry(ui, is_chosen, &info.name).on_hover_text(&info.question).clicked() {
-                    order.study.clone_from(&info.name);
+                    form.study.clone_from(&info.name);
                 }
             }
         });
@@ -80,9 +80,9 @@ fn form(ui: &mut Ui, state: &State, chosen: &StudyInfo, out: &mut Vec<Command>) 
     let grid = if chosen.grid.is_empty() { "none".to_owned() } else { chosen.grid.join(",") };
     Grid::new("order").num_columns(2).spacing([8.0, 3.0]).show(ui, |ui| {
         for (name, text, hint) in [
-            ("seeds".to_owned(), &mut order.seeds, format!("{WORLDS} worlds from seed 1 on")),
-            ("configurations".to_owned(), &mut order.configurations, Order::proposed(chosen).join(",")),
-            (format!("{}{unit}", chosen.variable), &mut order.grid, grid),
+            ("seeds".to_owned(), &mut form.seeds, format!("{WORLDS} worlds from seed 1 on")),
+            ("configurations".to_owned(), &mut form.configurations, StudyForm::proposed(chosen).join(",")),
+            (format!("{}{unit}", chosen.variable), &mut form.grid, grid),
         ] {
             let label = ui.label(theme::label(&name));
             let edit =
@@ -91,22 +91,22 @@ fn form(ui: &mut Ui, state: &State, chosen: &StudyInfo, out: &mut Vec<Command>) 
             ui.end_row();
         }
     });
-    start(ui, state, chosen, &order, out);
+    start(ui, state, chosen, &form, out);
     let all = chosen.configurations.join(",");
-    if chosen.configurations.len() > Order::proposed(chosen).len() && order.configurations != all {
+    if chosen.configurations.len() > StudyForm::proposed(chosen).len() && form.configurations != all {
         let words = format!("Use all {} configurations of this study", chosen.configurations.len());
         if ui.link(theme::note(words)).clicked() {
-            order.configurations = all;
+            form.configurations = all;
         }
     }
-    if order != state.studies.order {
-        out.push(Command::OrderStudy(order));
+    if form != state.studies.form {
+        out.push(Command::SetStudyForm(form));
     }
 }
 
-/// The button that starts the study, with the number of runs and the time that it takes.
-fn start(ui: &mut Ui, state: &State, chosen: &StudyInfo, order: &Order, out: &mut Vec<Command>) {
-    let request = order.request(chosen);
+/// Shows the button that starts the study, with the number of runs and the expected duration.
+fn start(ui: &mut Ui, state: &State, chosen: &StudyInfo, form: &StudyForm, out: &mut Vec<Command>) {
+    let request = form.request(chosen);
     ui.horizontal_wrapped(|ui| {
         let button = egui::Button::new("Start the study").min_size(vec2(110.0, 24.0));
         if ui.add_enabled(request.is_ok(), button).clicked() {
@@ -128,7 +128,7 @@ fn show_job(ui: &mut Ui, state: &State, job: &StudyJob, out: &mut Vec<Command>) 
     ui.horizontal_wrapped(|ui| {
         ui.label(RichText::new(&job.study).strong().color(theme::strong())).on_hover_text(&job.command);
         ui.label(RichText::new(word).color(colour));
-        // Before all that changes as the study goes on, so that they stay where they are.
+        // Placed before the parts that change during the study, so that the buttons do not move.
         if !figure::is_on_paper() {
             buttons(ui, state, job, out);
         }
@@ -147,7 +147,7 @@ fn show_job(ui: &mut Ui, state: &State, job: &StudyJob, out: &mut Vec<Command>) 
         let bar = egui::ProgressBar::new(job.share as f32).desired_height(6.0).fill(theme::accent());
         ui.add(bar).accessible_name(format!("{:.0} % done", 100.0 * job.share));
     }
-    // Studies of an earlier version repeat their state here.
+    // Studies of earlier versions repeat their state here.
     if !job.doing.is_empty() && job.doing != word {
         ui.add(egui::Label::new(theme::note(&job.doing)).wrap());
     }
@@ -157,7 +157,7 @@ fn show_job(ui: &mut Ui, state: &State, job: &StudyJob, out: &mut Vec<Command>) 
     ui.add_space(4.0);
 }
 
-/// What can be done with a job.
+/// Shows the buttons of a job.
 fn buttons(ui: &mut Ui, state: &State, job: &StudyJob, out: &mut Vec<Command>) {
     match job.state {
         StudyState::Waiting | StudyState::Running if state.studies.cancelling.contains(&job.id) => {
@@ -179,9 +179,9 @@ fn buttons(ui: &mut Ui, state: &State, job: &StudyJob, out: &mut Vec<Command>) {
             }
         }
     }
-    let is_looked = state.studies.looked.as_ref() == Some(&job.id);
-    if ui.add(egui::Button::selectable(is_looked, RichText::new("Result").size(12.0))).clicked() {
-        out.push(Command::LookAtStudy(job.id.clone()));
+    let is_shown_job = state.studies.shown_job.as_ref() == Some(&job.id);
+    if ui.add(egui::Button::selectable(is_shown_job, RichText::new("Result").size(12.0))).clicked() {
+        out.push(Command::ShowStudy(job.id.clone()));
     }
 }
 

@@ -1,4 +1,4 @@
-//! The result of a study in the page: its plot and its table.
+//! The result of a study in the page: plot and table.
 
 use egui::{Grid, RichText, ScrollArea, Ui};
 use sightline_study::row::Row;
@@ -9,7 +9,7 @@ use crate::state::State;
 use crate::studies::chart;
 use crate::theme;
 
-/// Columns of the table behind configuration, seed and the study's variable: name in the record, heading, factor.
+/// Columns of the table after configuration, seed and the study's variable: name in the record, heading, factor.
 const COLUMNS: [(&str, &str, f64); 10] = [
     ("targets", "targets", 1.0),
     ("tracked", "tracked", 1.0),
@@ -25,7 +25,7 @@ const COLUMNS: [(&str, &str, f64); 10] = [
 
 /// Shows plot and table of the selected job.
 pub(super) fn show(ui: &mut Ui, state: &State) {
-    let Some(job) = &state.studies.looked else { return };
+    let Some(job) = &state.studies.shown_job else { return };
     ui.separator();
     let Some(rows) = state.studies.rows.get(job) else {
         ui.label(theme::note("Loading the table …"));
@@ -76,7 +76,7 @@ pub(super) fn show(ui: &mut Ui, state: &State) {
     });
 }
 
-/// Table II with ours beside it, for the study that has odometry.
+/// Shows Table II of the paper beside our results, for a study with odometry.
 fn table_ii(ui: &mut Ui, rows: &[Row], job: &str) {
     let table = terrain_table::table(rows);
     if table.is_empty() {
@@ -100,7 +100,7 @@ fn table_ii(ui: &mut Ui, rows: &[Row], job: &str) {
     ui.separator();
 }
 
-/// A value of a row; a dash where there is none.
+/// A value of a row; a dash if it is missing.
 fn cell(row: &Row, column: &str, factor: f64) -> String {
     match (row.number(column), row.columns.get(column).and_then(|value| value.as_str())) {
         (Some(number), _) if factor == 1.0 && number.fract() == 0.0 => format!("{number}"),

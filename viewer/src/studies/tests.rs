@@ -1,4 +1,4 @@
-//! The panel of the validation experiments.
+//! The panel of the validation studies.
 
 use egui_kittest::kittest::{NodeT, Queryable};
 use sightline_api::endpoint::Call;
@@ -10,12 +10,12 @@ use sightline_study::row::Row;
 use sightline_study::wire::{StudyInfo, StudyJob, StudyRows, StudyState};
 
 use crate::command::Command;
+use crate::figure::request::{FigureFormat, FigureRequest};
 use crate::figure::save;
-use crate::figure::wish::{Kind, Wish};
 use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::state::messages::Weight;
-use crate::studies::Order;
+use crate::studies::StudyForm;
 use crate::tests::calls::{answer, bodies, calls, calls_of, refuse};
 use crate::tests::{Shown, fixture};
 
@@ -35,7 +35,7 @@ fn job(state: StudyState, k: usize) -> StudyJob {
     }
 }
 
-/// A page that knows one study, and a job of it.
+/// A page with one study, and a job of it.
 fn with_job(state: StudyState) -> State {
     let mut page = fixture::without_target();
     page.studies.infos = Some(vec![StudyInfo {
@@ -48,16 +48,16 @@ fn with_job(state: StudyState) -> State {
         scenarios: vec!["approach-5".to_owned()],
         points_per_value: 1,
     }]);
-    page.told(Event::StudyProgress { job: job(state, 3) });
+    page.apply_event(Event::StudyProgress { job: job(state, 3) });
     page
 }
 
 #[test]
-fn studies_are_asked_for_once() {
+fn studies_are_requested_once() {
     let mut page = fixture::without_target();
     page.take_requests();
-    page.want_studies();
-    page.want_studies();
+    page.read_studies_once();
+    page.read_studies_once();
     assert_eq!(calls_of::<ListStudies>(&mut page).len(), 1);
     Shown::pane(Pane::Studies, |_| fixture::without_target()).says("Asking the server for its studies");
 }
@@ -70,22 +70,22 @@ fn a_study_is_started_with_what_was_typed() {
     assert_eq!(shown.click("Start the study"), vec![Command::StartStudy]);
     let mut page = with_job(StudyState::Running);
     page.take_requests();
-    page.perform(Command::OrderStudy(Order { seeds: "7,8".to_owned(), ..Order::default() }));
+    page.perform(Command::SetStudyForm(StudyForm { seeds: "7,8".to_owned(), ..StudyForm::default() }));
     page.perform(Command::StartStudy);
     let [new] = bodies::<StartStudy>(&mut page).try_into().unwrap();
     assert_eq!((new.study.as_str(), new.seeds.as_slice()), ("straight", &[7, 8][..]));
     let wrong = Shown::pane(Pane::Studies, |_| {
         let mut page = with_job(StudyState::Running);
-        page.perform(Command::OrderStudy(Order { seeds: "seven".to_owned(), ..Order::default() }));
+        page.perform(Command::SetStudyForm(StudyForm { seeds: "seven".to_owned(), ..StudyForm::default() }));
         page
     });
     wrong.says("seven is not a whole number");
-    // Configurations and grid are checked while they are typed, too, by the name of their field.
+    // Configurations and grid are also checked as they are entered; errors name the field.
     let typed = |configurations: &str, grid: &str| {
         let (configurations, grid) = (configurations.to_owned(), grid.to_owned());
         Shown::pane(Pane::Studies, move |_| {
             let mut page = with_job(StudyState::Running);
-            page.perform(Command::OrderStudy(Order { configurations, grid, ..Order::default() }));
+            page.perform(Command::SetStudyForm(StudyForm { configurations, grid, ..StudyForm::default() }));
             page
         })
     };
@@ -126,14 +126,14 @@ fn a_job_says_how_far_it_is_and_can_be_stopped_or_read() {
     cancelling.says("cancelling …");
     let mut done = Shown::pane(Pane::Studies, |_| with_job(StudyState::Done));
     assert_eq!(done.click("Report"), vec![Command::OpenReport("j1".to_owned())]);
-    assert_eq!(done.click("Result"), vec![Command::LookAtStudy("j1".to_owned())]);
+    assert_eq!(done.click("Result"), vec![Command::ShowStudy("j1".to_owned())]);
     let mut stopped = Shown::pane(Pane::Studies, |_| with_job(StudyState::Cancelled));
     assert_eq!(stopped.click("Resume"), vec![Command::ResumeStudy("j1".to_owned())]);
 }
 
 #[test]
 fn the_buttons_of_a_study_stay_the_same_while_it_begins_and_another_one_is_started() {
-    // A press is carried out a frame after the control was found, so another one must not have its place and number.
+    // A click is handled a frame after the control was found, so that no other one may take its position and id.
     let shown = |first: StudyJob, other: Option<StudyJob>| {
         Shown::pane(Pane::Studies, move |_| {
             let mut page = with_job(StudyState::Running);
@@ -155,13 +155,13 @@ fn the_buttons_of_a_study_stay_the_same_while_it_begins_and_another_one_is_start
 fn a_late_progress_event_does_not_revive_a_cancelled_study() {
     let mut page = with_job(StudyState::Running);
     page.perform(Command::CancelStudy("j1".to_owned()));
-    // The event of the end arrives before the answer to the request, which was written while the study still ran.
-    page.told(Event::StudyProgress { job: job(StudyState::Cancelled, 5) });
+    // The event of the end arrives before the reply, which was written while the study was still running.
+    page.apply_event(Event::StudyProgress { job: job(StudyState::Cancelled, 5) });
     answer::<CancelStudy>(&mut page, &job(StudyState::Running, 4));
     assert_eq!(page.studies.jobs[0].state, StudyState::Cancelled);
-    page.told(Event::StudyProgress { job: job(StudyState::Running, 4) });
+    page.apply_event(Event::StudyProgress { job: job(StudyState::Running, 4) });
     assert_eq!(page.studies.jobs[0].state, StudyState::Cancelled);
-    page.told(Event::StudyProgress { job: job(StudyState::Waiting, 6) });
+    page.apply_event(Event::StudyProgress { job: job(StudyState::Waiting, 6) });
     assert_eq!(page.studies.jobs[0].state, StudyState::Waiting, "resumed elsewhere");
 }
 
@@ -169,7 +169,7 @@ fn a_late_progress_event_does_not_revive_a_cancelled_study() {
 fn a_restarted_server_that_counts_anew_is_heard() {
     let mut page = with_job(StudyState::Running);
     page.studies.make_stale();
-    page.want_studies();
+    page.read_studies_once();
     answer::<ListStudyJobs>(&mut page, &vec![job(StudyState::Cancelled, 1)]);
     assert_eq!(page.studies.jobs[0].state, StudyState::Cancelled);
 }
@@ -179,7 +179,7 @@ fn the_bar_moves_while_worlds_are_rendered() {
     let shown = Shown::pane(Pane::Studies, |_| {
         let mut page = with_job(StudyState::Running);
         let rendering = StudyJob { share: 0.2, ..job(StudyState::Running, 0) };
-        page.told(Event::StudyProgress { job: StudyJob { revision: 9, ..rendering } });
+        page.apply_event(Event::StudyProgress { job: StudyJob { revision: 9, ..rendering } });
         page
     });
     shown.says("20 % done").says("0 of 40 runs");
@@ -190,7 +190,7 @@ fn the_state_of_a_study_is_said_once() {
     let done = StudyJob { doing: "done".to_owned(), ..job(StudyState::Done, 40) };
     let shown = Shown::pane(Pane::Studies, |_| {
         let mut page = with_job(StudyState::Running);
-        page.told(Event::StudyProgress { job: done });
+        page.apply_event(Event::StudyProgress { job: done });
         page
     });
     assert_eq!(shown.harness.query_all_by_label("done").count(), 1);
@@ -212,10 +212,10 @@ fn the_table_has_a_row_for_each_unit_and_grows_with_the_job() {
         columns: columns(19),
     };
     let mut page = with_job(StudyState::Running);
-    page.perform(Command::LookAtStudy("j1".to_owned()));
+    page.perform(Command::ShowStudy("j1".to_owned()));
     let of_job = Call::to::<ShowStudyRows>(&AtStudyJob { job: "j1".to_owned() });
     assert!(calls(&mut page).contains(&of_job));
-    page.told(Event::StudyProgress { job: job(StudyState::Running, 4) });
+    page.apply_event(Event::StudyProgress { job: job(StudyState::Running, 4) });
     assert!(calls(&mut page).contains(&of_job), "one more unit is done");
     for rows in [Vec::new(), vec![row]] {
         answer::<ShowStudyRows>(&mut page, &StudyRows { rows });
@@ -233,7 +233,7 @@ fn the_table_has_a_row_for_each_unit_and_grows_with_the_job() {
 /// A study with results.
 fn with_result() -> State {
     let mut page = with_job(StudyState::Done);
-    page.perform(Command::LookAtStudy("j1".to_owned()));
+    page.perform(Command::ShowStudy("j1".to_owned()));
     let rows = (0..10u64).map(|k| Row {
         study: "straight".to_owned(),
         configuration: ["ncc", "sightline"][(k % 2) as usize].to_owned(),
@@ -255,8 +255,8 @@ fn a_figure_of_a_study_has_its_result_and_no_form() {
     let context = egui::Context::default();
     let mut output = context.run_ui(egui::RawInput::default(), |_| {});
     output.textures_delta.clear();
-    let wish = Wish { pane: Pane::Studies, kind: Kind::Svg };
-    let file = save::take(&context, &with_result(), &[], wish).unwrap();
+    let request = FigureRequest { pane: Pane::Studies, kind: FigureFormat::Svg };
+    let file = save::take(&context, &with_result(), &[], request).unwrap();
     let text = String::from_utf8(file.bytes).unwrap();
     assert!(text.contains("targets tracked, %") && !text.contains("Start the study"), "{text}");
     // Three numbered ticks: 0, 50 and 100.

@@ -1,4 +1,4 @@
-//! Starts, stops and follows studies.
+//! Starts, cancels and follows studies.
 
 use sightline_api::endpoint::Call;
 use sightline_api::endpoints::{
@@ -9,16 +9,16 @@ use sightline_study::wire::{NewStudy, StudyJob};
 
 use crate::state::State;
 
-/// Starts a study.
+/// The call that starts a study.
 pub(crate) fn start_study(new: &NewStudy) -> Call {
     Call::with_body::<StartStudy>(&Anywhere {}, new)
 }
 
 impl State {
-    /// Asks for the studies, once: while their panel is on the screen.
-    pub fn want_studies(&mut self) {
-        if !self.studies.is_asked {
-            self.studies.is_asked = true;
+    /// Requests the list of studies once, when their panel becomes visible.
+    pub fn read_studies_once(&mut self) {
+        if !self.studies.is_requested {
+            self.studies.is_requested = true;
             let infos = Call::to::<ListStudies>(&Anywhere {});
             let shown = infos.clone();
             self.call_with_problem::<ListStudies>(infos, move |state, found| match found {
@@ -29,25 +29,25 @@ impl State {
                 }
             });
             let jobs = Call::to::<ListStudyJobs>(&Anywhere {});
-            self.call::<ListStudyJobs>(jobs, |state, jobs| state.studies.took_all(jobs));
+            self.call::<ListStudyJobs>(jobs, |state, jobs| state.studies.set_jobs(jobs));
         }
     }
 
-    /// Takes in that a study went on; the table that is looked at grows with it.
-    pub(crate) fn study_went_on(&mut self, job: StudyJob) {
+    /// Stores the progress of a study; the displayed table is read again when it has grown.
+    pub(crate) fn update_study(&mut self, job: StudyJob) {
         let has_more =
             self.studies.jobs.iter().find(|known| known.id == job.id).is_none_or(|known| known.k < job.k);
-        if has_more && self.studies.looked.as_ref() == Some(&job.id) {
+        if has_more && self.studies.shown_job.as_ref() == Some(&job.id) {
             self.read_study_rows(job.id.clone());
         }
-        self.studies.took(job);
+        self.studies.store_job(job);
     }
 
-    /// Starts the study that the order describes.
+    /// Starts the study that the form describes.
     pub(crate) fn start_study(&mut self) {
         let Some(info) = self.studies.chosen() else { return };
-        match self.studies.order.request(info) {
-            Ok(new) => self.call::<StartStudy>(start_study(&new), |state, job| state.studies.took(job)),
+        match self.studies.form.request(info) {
+            Ok(new) => self.call::<StartStudy>(start_study(&new), |state, job| state.studies.store_job(job)),
             Err(sentence) => self.messages.problem(sentence, None),
         }
     }
@@ -56,14 +56,14 @@ impl State {
     pub(crate) fn cancel_study(&mut self, job: String) {
         self.studies.cancelling.insert(job.clone());
         let call = Call::to::<CancelStudy>(&AtStudyJob { job });
-        self.call::<CancelStudy>(call, |state, job| state.studies.took(job));
+        self.call::<CancelStudy>(call, |state, job| state.studies.store_job(job));
     }
 
-    /// Lets a stopped study go on.
+    /// Resumes a stopped study.
     pub(crate) fn resume_study(&mut self, job: String) {
         self.studies.cancelling.remove(&job);
         let call = Call::to::<ResumeStudy>(&AtStudyJob { job });
-        self.call::<ResumeStudy>(call, |state, job| state.studies.took(job));
+        self.call::<ResumeStudy>(call, |state, job| state.studies.store_job(job));
     }
 
     fn read_study_rows(&mut self, job: String) {
@@ -73,9 +73,9 @@ impl State {
         });
     }
 
-    /// Looks at a study's table.
-    pub(crate) fn look_at_study(&mut self, job: String) {
+    /// Shows a study's table.
+    pub(crate) fn show_study(&mut self, job: String) {
         self.read_study_rows(job.clone());
-        self.studies.looked = Some(job);
+        self.studies.shown_job = Some(job);
     }
 }

@@ -7,7 +7,7 @@ use crate::panels::pane::Pane;
 use crate::state::calculator::{Calculator, Pair};
 use crate::tests::{Shown, fixture};
 use crate::theme;
-use crate::theme::Looks;
+use crate::theme::ColourTheme;
 
 #[test]
 fn the_left_image_says_how_the_subframe_is_exposed_and_which_stretch_is_on() {
@@ -27,7 +27,7 @@ fn the_left_image_says_how_the_subframe_is_exposed_and_which_stretch_is_on() {
     by_hand.says("brightness").says("contrast").says("gamma");
 }
 
-/// How many lines of this colour a shape has.
+/// Number of lines of this colour in a shape.
 fn lines(shape: &egui::Shape, colour: egui::Color32) -> usize {
     use egui::Shape;
     let is_it = match shape {
@@ -43,9 +43,9 @@ fn lines(shape: &egui::Shape, colour: egui::Color32) -> usize {
 #[test]
 fn truth_is_white_on_an_image_in_the_light_looks_too() {
     for pane in [Pane::Left, Pane::CloseUp] {
-        for looks in [Looks::Dark, Looks::Light] {
+        for colour_theme in [ColourTheme::Dark, ColourTheme::Light] {
             let shown = Shown::pane(pane, move |context| {
-                theme::apply(context, looks);
+                theme::apply(context, colour_theme);
                 let mut state = fixture::at_step(context, 2);
                 let view = View2d::At { centre: fixture::PIXEL, scale: 1.0 };
                 state.perform(Command::View(Zoomable::Left, view));
@@ -53,13 +53,13 @@ fn truth_is_white_on_an_image_in_the_light_looks_too() {
             });
             let shapes = || shown.harness.output().shapes.iter();
             let count = |colour| shapes().map(|clipped| lines(&clipped.shape, colour)).sum::<usize>();
-            // White in the dark looks, black in the light ones.
-            let of = [Looks::Dark, Looks::Light].map(|looks| {
-                theme::choose(looks);
+            // White in the dark scheme, black in the light ones.
+            let of = [ColourTheme::Dark, ColourTheme::Light].map(|colour_theme| {
+                theme::choose(colour_theme);
                 theme::truth()
             });
             let [white, black] = of.map(count);
-            assert!(white >= 2 && black == 0, "{pane:?} {looks:?}: {white} white, {black} black");
+            assert!(white >= 2 && black == 0, "{pane:?} {colour_theme:?}: {white} white, {black} black");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Several cameras a stop: which images are shown, where marks and picks belong, and what a missing image says.
+//! Several cameras per stop: displayed images, the images of marks and picks, and explanations of missing images.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use sightline_api::wire::{NewTarget, StopCameraView, StopDetail};
 use sightline_geometry::camera::CameraName;
 use sightline_geometry::frames::Pixel;
 
-use crate::cache::{Eye, Item, Key};
+use crate::cache::{ImageSide, Item, Key};
 use crate::command::{Command, Mode};
 use crate::drawing::raster::Raster;
 use crate::drawing::view2d::View2d;
@@ -40,12 +40,12 @@ fn with_cameras(context: &egui::Context, step: usize) -> State {
 fn showing(context: &egui::Context, step: usize, camera: Option<CameraName>) -> State {
     let mut state = with_cameras(context, step);
     state.perform(Command::ShowCamera(camera));
-    for eye in [Eye::Left, Eye::Right] {
+    for side in [ImageSide::Left, ImageSide::Right] {
         let image = sightline_vision::image::GrayImage::from_pixel(64, 64, image::Luma([0.5]));
         let bytes = sightline_vision::image::io::encode_png_u8(&image).unwrap();
-        let raster = Raster::from_png(context, eye.word(), &bytes).unwrap();
-        if let Some(key) = state.image_key(step, eye) {
-            state.cache.arrived(key, Ok(Item::Raster(Arc::new(raster))), 0.0);
+        let raster = Raster::from_png(context, side.word(), &bytes).unwrap();
+        if let Some(key) = state.image_key(step, side) {
+            state.cache.store(key, Ok(Item::Raster(Arc::new(raster))), 0.0);
         }
     }
     state
@@ -73,7 +73,7 @@ fn marks_are_painted_on_the_images_of_the_targets_camera_alone() {
     assert!(!hazcam.has("legend"), "there is no mark on it");
     let mut state = showing(&egui::Context::default(), 2, Some(name("front_hazcam")));
     assert!(state.trace().is_some() && state.trace_on_image().is_none());
-    // A target of the hazcams has its marks there, and the images follow it.
+    // A target of the hazcams has its marks there, and its selection shows that camera.
     state.session.as_mut().unwrap().targets[0].designation.camera = Some(name("front_hazcam"));
     assert!(state.trace_on_image().is_some() && state.camera_to_link().is_none());
     state.perform(Command::ShowCamera(None));
@@ -89,10 +89,10 @@ fn images_that_a_stop_lacks_say_so() {
     right.says("The camera mono of step 2 is a single one: it has no right image");
     let mut loading = with_cameras(&egui::Context::default(), 2);
     loading.perform(Command::ShowCamera(mono));
-    assert_eq!(loading.image_key(3, Eye::Left), None);
-    assert_eq!(loading.image_key(2, Eye::Right), None);
-    let wanted = loading.wanted();
-    let image = Key::Image { traverse: "drive".to_owned(), step: 2, eye: Eye::Left, camera: mono };
+    assert_eq!(loading.image_key(3, ImageSide::Left), None);
+    assert_eq!(loading.image_key(2, ImageSide::Right), None);
+    let wanted = loading.needed_items();
+    let image = Key::Image { traverse: "drive".to_owned(), step: 2, side: ImageSide::Left, camera: mono };
     assert!(wanted.contains(&image));
     assert!(loading.unrendered(&wanted).contains(&image), "it may have to be rendered");
     let further = |key: &Key| matches!(key, Key::Image { camera: Some(_), step, .. } if *step != 2);
@@ -113,7 +113,7 @@ fn a_pick_in_a_camera_designates_with_its_name() {
     let sent = bodies::<DesignateTarget>(&mut state);
     let expected = NewTarget { camera: hazcam, ..NewTarget::at_pixel(2, Pixel::new(20.0, 30.0)) };
     assert_eq!(sent, [expected]);
-    // Another camera is shown in full, because the view meant the image before.
+    // Another camera is fitted to the panel, because the view was for the previous image.
     state.views.left = View2d::At { centre: Pixel::new(10.0, 10.0), scale: 4.0 };
     state.perform(Command::ShowCamera(None));
     assert_eq!(state.views.left, View2d::Fit);
@@ -123,8 +123,8 @@ fn a_pick_in_a_camera_designates_with_its_name() {
 fn the_cameras_of_the_shown_images_are_those_of_the_stop() {
     let mut state = showing(&egui::Context::default(), 2, Some(name("front_hazcam")));
     let key = state.stop_detail_key(2).unwrap();
-    assert!(state.wanted().contains(&key), "the record has the cameras of the target's pair alone");
-    assert!(state.eyes().is_none());
+    assert!(state.needed_items().contains(&key), "the record has the cameras of the target's pair alone");
+    assert!(state.stereo_cameras().is_none());
     let pointing = state.trace().unwrap().point_mast.clone();
     let model = sightline_api::wire::StopCameraModels {
         name: name("front_hazcam"),
@@ -138,8 +138,8 @@ fn the_cameras_of_the_shown_images_are_those_of_the_stop() {
         mast: None,
         cameras: vec![model],
     };
-    state.cache.arrived(key, Ok(Item::Stop(Arc::new(detail))), 0.0);
-    assert_eq!(state.eyes(), Some((&pointing.right, &pointing.left)));
+    state.cache.store(key, Ok(Item::Stop(Arc::new(detail))), 0.0);
+    assert_eq!(state.stereo_cameras(), Some((&pointing.right, &pointing.left)));
     state.perform(Command::ShowCamera(None));
-    assert_eq!(state.eyes(), Some((&pointing.left, &pointing.right)));
+    assert_eq!(state.stereo_cameras(), Some((&pointing.left, &pointing.right)));
 }

@@ -23,18 +23,18 @@ use crate::tests::fixture;
 
 /// Features of the left image.
 pub(crate) const FEATURES: usize = 60;
-/// Those that became points: every feature but each fourth.
+/// Number of triangulated features: all but every fourth.
 pub(crate) const POINTS: usize = 45;
-/// Those that were matched with the earlier stop: the first of the points.
+/// Number of features matched with the earlier stop: the first of the triangulated ones.
 pub(crate) const MATCHES: usize = 30;
-/// Matches that agree with the motion: all but each fifth.
+/// Number of inliers: all but every fifth match.
 pub(crate) const INLIERS: usize = 24;
-/// Sets of the bootstrap.
+/// Number of bootstrap sets.
 const SETS: usize = 40;
-/// Where the target is, m, rover frame.
+/// Position of the target, m, rover frame.
 const POSITION: [f64; 3] = [6.0, 0.4, 0.2];
 
-/// A session with one target and its run by features, at `step`, with everything of that step loaded.
+/// A session with one target and its run by features, at `step`, with all data of that step loaded.
 pub(crate) fn at_step(context: &egui::Context, step: usize) -> State {
     let mut state = fixture::at_step(context, step);
     let traces: Vec<RunStep> = (0..fixture::STOPS - 1).map(trace).collect();
@@ -51,13 +51,13 @@ pub(crate) fn at_step(context: &egui::Context, step: usize) -> State {
         let [width, height] = view.size();
         let array = GrayImage::from_raw(width, height, view.values().to_vec()).unwrap();
         let table = tables::Table::from_npy(name, &npy::encode(&array).unwrap()).unwrap();
-        state.cache.arrived(Key::Array(key.clone(), name), Ok(Item::Table(Arc::new(table))), 0.0);
+        state.cache.store(Key::Array(key.clone(), name), Ok(Item::Table(Arc::new(table))), 0.0);
     }
     fixture::load(&mut state, trace);
     state
 }
 
-/// The record of a step: the designation by point stereo, then motions from the one or two stops before.
+/// The record of a step: the designation by point stereo, then motions from the one or two previous stops.
 pub(crate) fn trace(step: usize) -> RunStep {
     let mut trace = fixture::trace(step);
     let located = trace.located_mut().unwrap();
@@ -121,7 +121,7 @@ fn fitted() -> FittedMotion {
     }
 }
 
-/// A grid of features; scales run from 1 to 4 px, residuals of inliers from 1 to 24 mm, those of outliers are 0.3 m.
+/// A grid of features; scales are from 1 to 4 px, residuals of inliers from 1 to 24 mm, those of outliers 0.3 m.
 fn table(step: usize) -> Table {
     let mut values = vec![f32::NAN; FEATURES * FeatureColumn::COUNT];
     let (mut points, mut inliers) = (0, 0);
@@ -167,5 +167,5 @@ fn cloud() -> Table {
     Table { columns: CLOUD_COLUMNS as u32, values: values.collect() }
 }
 
-/// The first matched feature that agrees with the motion, px.
+/// Pixel of the first inlier.
 pub(crate) const FIRST_INLIER: Pixel = Pixel::new(100.0, 200.0);

@@ -1,4 +1,4 @@
-//! A run by features: the panel about it, its marks on the images, and what the panels about templates say of it.
+//! A run by features: its panel, its marks on the images, and the explanations in the panels about templates.
 
 use egui::Shape;
 use serde_json::json;
@@ -18,7 +18,7 @@ use crate::tests::feature_run::{FIRST_INLIER, INLIERS, MATCHES};
 use crate::tests::{Shown, fixture};
 use crate::theme;
 
-/// Residuals up to 10.5 mm, which ten inliers have and no outlier has.
+/// Maximum residual that ten inliers and no outlier satisfy: 10.5 mm.
 fn small_residuals() -> FeatureView {
     FeatureView { residual_m: [0.0, 0.0105], ..FeatureView::default() }
 }
@@ -42,12 +42,12 @@ fn left_image(state: impl FnOnce(&egui::Context) -> State + 'static) -> Shown<'s
     })
 }
 
-/// How many shapes of a screen satisfy a condition.
+/// Number of shapes on a screen that satisfy a condition.
 fn painted(shown: &Shown<'_>, is_meant: impl Fn(&Shape) -> bool) -> usize {
     shown.harness.output().shapes.iter().filter(|clipped| is_meant(&clipped.shape)).count()
 }
 
-/// Dots of inliers, and strokes of outliers' crosses, the legend's own among them.
+/// Number of inlier dots and of outlier crosses, including those of the legend.
 fn dots_and_crosses(shown: &Shown<'_>) -> (usize, usize) {
     let dots = painted(shown, |shape| matches!(shape, Shape::Circle(c) if c.fill == theme::inlier()));
     let strokes = painted(shown, |shape| match shape {
@@ -116,7 +116,7 @@ fn inliers_and_outliers_are_layers_of_their_own_and_what_would_drown_the_picture
         state
     });
     assert_eq!(circles(&shown), 0);
-    // Every fourth feature has no partner and a fainter circle.
+    // Every fourth feature has no match and a fainter circle.
     assert_eq!(circles(&with_all), feature_run::POINTS);
 }
 
@@ -124,7 +124,7 @@ fn inliers_and_outliers_are_layers_of_their_own_and_what_would_drown_the_picture
 fn the_covariance_of_a_moved_target_is_projected_and_that_of_a_match_is_its_own() {
     let of = |trace: &StepTrace| moved_covariance_px2(trace.located().unwrap(), &trace.point_mast.left);
     let [long, short] = crate::drawing::ellipse::axes(&of(&feature_run::trace(2)).unwrap()).unwrap();
-    // 1 cm across the line of sight at 6 m, by a camera of some 1200 px focal length.
+    // 1 cm across the line of sight at 6 m, with a focal length of about 1200 px.
     assert!((1.0..6.0).contains(&short.norm()) && long.norm() < 10.0, "{long} {short}");
     assert!(of(&fixture::trace(2)).is_none());
 }

@@ -1,4 +1,4 @@
-//! Figures of panels: what is painted is in the file, the file is well-formed, and pictures are sharp at every scale.
+//! Figures of panels: all painted content is in the file, the file is well-formed, and images are sharp at every scale.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -8,9 +8,9 @@ use egui::{Rect, Shape};
 use egui_kittest::kittest::Queryable;
 
 use crate::command::Command;
-use crate::exports::Ask;
+use crate::exports::ExportsCommand;
+use crate::figure::request::{FigureFormat, FigurePage, FigureRequest};
 use crate::figure::save;
-use crate::figure::wish::{Kind, Sheet, Wish};
 use crate::figure::{Figure, Form, Ink, bitmap, shapes, svg};
 use crate::layout::show_pane;
 use crate::panels::pane::Pane;
@@ -18,7 +18,7 @@ use crate::state::State;
 use crate::tests::{Shown, fixture};
 use crate::theme;
 
-/// A panel as it was painted last, with its figure and the fonts.
+/// A panel as last painted, with its figure and the fonts.
 struct Taken {
     shown: Shown<'static>,
     figure: Figure,
@@ -42,7 +42,7 @@ fn at_two(context: &egui::Context) -> State {
     fixture::at_step(context, 2)
 }
 
-/// Keeps a file in the folder that `SIGHTLINE_SHOTS` names, to be looked at.
+/// Writes a file to the folder `SIGHTLINE_SHOTS`, for inspection.
 pub(super) fn keep(name: &str, bytes: &[u8]) {
     if let Some(folder) = std::env::var_os("SIGHTLINE_SHOTS") {
         let folder = std::path::PathBuf::from(folder);
@@ -51,7 +51,7 @@ pub(super) fn keep(name: &str, bytes: &[u8]) {
     }
 }
 
-/// Counts a shape that paints something: among words, or among the others.
+/// Counts a visible shape: as text, or as another shape.
 fn count(shape: &Shape, counted: &mut [usize; 2]) {
     match shape {
         Shape::Noop | Shape::Vec(_) => {}
@@ -84,13 +84,13 @@ fn every_panel_becomes_well_formed_xml_with_all_its_words() {
             .filter_map(|node| node.text())
             .collect::<Vec<_>>()
             .join("\n");
-        // What a screen reader finds on the panel and what lies wholly on it is in the file.
+        // Everything that a screen reader finds on the panel and that is entirely on it is in the file.
         let screen = Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(512.0, 412.0));
         let mut checked = 0;
         for node in taken.shown.harness.query_all_by_role(egui::accesskit::Role::Label) {
             let (Some(value), place) = (node.value(), node.rect()) else { continue };
             let first = value.split_whitespace().next().unwrap_or_default();
-            // The boxes of the state machine are described by more words than are painted in them.
+            // The descriptions of the state machine's boxes have more words than are painted.
             let is_painted = value.lines().count() == 1 && pane != Pane::Machine;
             if is_painted && screen.contains_rect(place) && !first.is_empty() {
                 let is_there = all.contains(first) || all.to_lowercase().contains(&first.to_lowercase());
@@ -98,7 +98,7 @@ fn every_panel_becomes_well_formed_xml_with_all_its_words() {
                 checked += 1;
             }
         }
-        // The strip, the state machine and the close-up paint their words; they are no labels.
+        // The strip, the state machine and the close-up paint their words; they have no labels.
         let is_painted_only = [Pane::Strip, Pane::Machine, Pane::CloseUp].contains(&pane);
         assert!(checked > 0 || is_painted_only && all.lines().count() > 2, "{pane:?} has words: {all}");
         assert!(
@@ -139,7 +139,7 @@ fn every_shape_that_is_painted_is_in_the_file() {
         let others = of(&["rect", "circle", "ellipse", "path", "image"]);
         assert!(counted[0] > 3 && counted[1] > 3, "{pane:?} has {counted:?}");
         assert!(words >= counted[0], "{pane:?}: {words} texts of {}", counted[0]);
-        // A mesh with a texture that nobody knows is left out here: at most one image a panel, and its checker.
+        // A mesh with an unknown texture is omitted here: at most one image per panel, and its checker.
         assert!(others + 2 >= counted[1], "{pane:?}: {others} elements of {}", counted[1]);
     }
 }
@@ -252,8 +252,8 @@ fn a_file_says_in_its_name_and_above_it_of_what_it_is() {
     let mut output = context.run_ui(egui::RawInput::default(), |_| {});
     output.textures_delta.clear();
     let mut state = fixture::at_step(&context, 2);
-    let wish = |kind| Wish { pane: Pane::Map, kind };
-    let svg = save::take(&context, &state, &[], wish(Kind::Svg)).unwrap();
+    let request = |kind| FigureRequest { pane: Pane::Map, kind };
+    let svg = save::take(&context, &state, &[], request(FigureFormat::Svg)).unwrap();
     assert_eq!(svg.name, "sightline-s1-ridge-run-a-step-2-map-site-frame.svg");
     assert!(svg.sentence.contains("not on the screen: it was drawn apart"), "{}", svg.sentence);
     let text = String::from_utf8(svg.bytes).unwrap();
@@ -264,12 +264,12 @@ fn a_file_says_in_its_name_and_above_it_of_what_it_is() {
     assert!(word("desc").contains("Session s1. Tracking state: TRACKING."), "{}", word("desc"));
     assert_eq!(document.root_element().attribute("height"), Some("480"));
 
-    state.perform(Command::Exports(Ask::BurnIn(true)));
-    let png = save::take(&context, &state, &[], wish(Kind::Png(3))).unwrap();
+    state.perform(Command::Exports(ExportsCommand::BurnIn(true)));
+    let png = save::take(&context, &state, &[], request(FigureFormat::Png(3))).unwrap();
     assert_eq!(png.name, "sightline-s1-ridge-run-a-step-2-map-site-frame-3x.png");
     let picture = image::load_from_memory(&png.bytes).unwrap();
     assert!(picture.width() == 3 * 720 && picture.height() > 3 * 480, "the line is above the panel");
-    let svg = save::take(&context, &state, &[], wish(Kind::Svg)).unwrap();
+    let svg = save::take(&context, &state, &[], request(FigureFormat::Svg)).unwrap();
     let text = String::from_utf8(svg.bytes).unwrap();
     assert!(text.contains(">Map, site frame: Six stops, ridge run A, step 2 of 5</text>"), "{text}");
 }
@@ -277,26 +277,29 @@ fn a_file_says_in_its_name_and_above_it_of_what_it_is() {
 #[test]
 fn a_figure_for_a_paper_is_white_and_shows_no_controls_and_all_of_a_list() {
     let context = egui::Context::default();
-    theme::apply(&context, theme::Looks::Dark);
+    theme::apply(&context, theme::ColourTheme::Dark);
     let mut output = context.run_ui(egui::RawInput::default(), |_| {});
     output.textures_delta.clear();
     let mut state = fixture::at_step(&context, 2);
     let take = |state: &State, pane| {
-        let file = save::take(&context, state, &[], Wish { pane, kind: Kind::Png(1) }).unwrap();
+        let file =
+            save::take(&context, state, &[], FigureRequest { pane, kind: FigureFormat::Png(1) }).unwrap();
         image::load_from_memory(&file.bytes).unwrap().to_rgb8()
     };
     let svg = |state: &State| {
-        let file = save::take(&context, state, &[], Wish { pane: Pane::Plots, kind: Kind::Svg }).unwrap();
+        let file =
+            save::take(&context, state, &[], FigureRequest { pane: Pane::Plots, kind: FigureFormat::Svg })
+                .unwrap();
         String::from_utf8(file.bytes).unwrap()
     };
-    state.perform(Command::Exports(Ask::Sheet(Sheet::Paper(360))));
+    state.perform(Command::Exports(ExportsCommand::Sheet(FigurePage::Paper(360))));
     let plots = take(&state, Pane::Plots);
     assert_eq!((plots.width(), plots.get_pixel(1, 1).0), (360, [255, 255, 255]));
     assert!(!svg(&state).contains("plot …"), "a control");
-    assert_eq!(theme::looks(), theme::Looks::Dark, "the page keeps its looks");
+    assert_eq!(theme::colour_theme(), theme::ColourTheme::Dark, "the page keeps its looks");
     let list = take(&state, Pane::Settings);
     assert!(list.height() > 480, "not cropped: {}", list.height());
-    state.perform(Command::Exports(Ask::Sheet(Sheet::Screen)));
+    state.perform(Command::Exports(ExportsCommand::Sheet(FigurePage::Screen)));
     assert_ne!(take(&state, Pane::Plots).get_pixel(1, 1).0, [255, 255, 255]);
     assert!(svg(&state).contains("plot …"));
 }
@@ -320,18 +323,19 @@ fn the_menu_and_the_palette_save_every_panel() {
     let mut shown = Shown::new([520.0, 300.0], at_two, |ui, state, out| {
         crate::exports::figure_menu::entries(ui, state, Pane::Gates, out);
     });
-    let wish = |kind| vec![Command::Exports(Ask::Figure(Wish { pane: Pane::Gates, kind }))];
-    assert_eq!(shown.click("save Gates as SVG"), wish(Kind::Svg));
-    assert_eq!(shown.click("save Gates as PNG 4x"), wish(Kind::Png(4)));
+    let request =
+        |kind| vec![Command::Exports(ExportsCommand::Figure(FigureRequest { pane: Pane::Gates, kind }))];
+    assert_eq!(shown.click("save Gates as SVG"), request(FigureFormat::Svg));
+    assert_eq!(shown.click("save Gates as PNG 4x"), request(FigureFormat::Png(4)));
     let burn = shown.click("with a line above: panel, drive, run, step");
-    assert_eq!(burn, vec![Command::Exports(Ask::BurnIn(true))]);
+    assert_eq!(burn, vec![Command::Exports(ExportsCommand::BurnIn(true))]);
     let found = crate::command::actions::find(&fixture::without_target(), "save gates svg");
-    assert_eq!(vec![found[0].command.clone()], wish(Kind::Svg));
+    assert_eq!(vec![found[0].command.clone()], request(FigureFormat::Svg));
 }
 
 #[test]
 fn after_a_change_of_looks_panels_paint_what_they_would_have_painted_in_them() {
-    use crate::theme::Looks;
+    use crate::theme::ColourTheme;
     let paint = |context: &egui::Context, state: &State, pane: Pane| {
         let screen = Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(520.0, 420.0));
         let mut shapes = Vec::new();
@@ -347,22 +351,22 @@ fn after_a_change_of_looks_panels_paint_what_they_would_have_painted_in_them() {
         svg::text(&figure).unwrap()
     };
     for pane in Pane::ALL {
-        for later in [Looks::Light, Looks::Contrast] {
+        for later in [ColourTheme::Light, ColourTheme::Contrast] {
             let context = egui::Context::default();
-            theme::apply(&context, Looks::Dark);
+            theme::apply(&context, ColourTheme::Dark);
             let mut state = fixture::at_step(&context, 2);
             let dark = paint(&context, &state, pane);
             theme::apply(&context, later);
-            state.looks = later;
+            state.colour_theme = later;
             let changed = paint(&context, &state, pane);
             let fresh = egui::Context::default();
             theme::apply(&fresh, later);
             let mut state = fixture::at_step(&fresh, 2);
-            state.looks = later;
+            state.colour_theme = later;
             let opened = paint(&fresh, &state, pane);
             assert!(changed == opened, "{pane:?}: something kept the dark colours in {later:?}");
             assert!(changed != dark, "{pane:?}: {later:?} changes nothing");
         }
     }
-    theme::apply(&egui::Context::default(), Looks::Dark);
+    theme::apply(&egui::Context::default(), ColourTheme::Dark);
 }

@@ -19,19 +19,19 @@ use sightline_track::trace::ArrayName;
 use sightline_vision::image::{GrayImage, npy};
 use std::sync::Arc;
 
-use crate::cache::{Eye, Item, Key, StepKey};
+use crate::cache::{ImageSide, Item, Key, StepKey};
 use crate::drawing::raster::Raster;
 use crate::net::events::Connection;
 use crate::state::State;
 use crate::tables::Table;
 
-/// How many stops the drive has.
+/// Number of stops of the drive.
 pub(crate) const STOPS: usize = 6;
-/// Where the target is seen at every stop, px.
+/// The target's pixel at every stop.
 pub(crate) const PIXEL: Pixel = Pixel::new(512.3, 480.6);
 const POSITION: [f64; 3] = [6.0, 0.4, 0.2];
 
-/// A server that said nothing yet.
+/// A state before any reply of the server.
 pub(crate) fn nothing() -> State {
     State::new("http://localhost".to_owned(), None)
 }
@@ -67,7 +67,7 @@ pub(crate) fn without_target() -> State {
     state
 }
 
-/// A session with one target and its run, at `step`, with everything of that step loaded.
+/// A session with one target and its run, at `step`, with all data of that step loaded.
 pub(crate) fn at_step(context: &egui::Context, step: usize) -> State {
     let mut state = without_target();
     let traces: Vec<RunStep> = (0..STOPS - 1).map(trace).collect();
@@ -97,17 +97,17 @@ pub(crate) fn at_step(context: &egui::Context, step: usize) -> State {
         (name, Item::Raster(Arc::new(raster)))
     };
     let arrays = ArrayName::all().filter(|name| !Table::is_table(*name)).map(array).collect();
-    state.cache.arrived(Key::Arrays(key), Ok(Item::Arrays(arrays)), 0.0);
-    for eye in [Eye::Left, Eye::Right] {
+    state.cache.store(Key::Arrays(key), Ok(Item::Arrays(arrays)), 0.0);
+    for side in [ImageSide::Left, ImageSide::Right] {
         let bytes = sightline_vision::image::io::encode_png_u8(&bump(64)).unwrap();
-        let raster = Raster::from_png(context, eye.word(), &bytes).unwrap();
-        let key = state.image_key(step, eye).unwrap();
-        state.cache.arrived(key, Ok(Item::Raster(Arc::new(raster))), 0.0);
+        let raster = Raster::from_png(context, side.word(), &bytes).unwrap();
+        let key = state.image_key(step, side).unwrap();
+        state.cache.store(key, Ok(Item::Raster(Arc::new(raster))), 0.0);
     }
     state
 }
 
-/// As [`at_step`], with the records and windows of all steps loaded; every step saw the same from the same distance.
+/// As [`at_step`], with the records and windows of all steps loaded; every step has the same image at the same range.
 pub(crate) fn with_history(context: &egui::Context, step: usize) -> State {
     let mut state = at_step(context, step);
     for other in 0..STOPS - 1 {
@@ -121,16 +121,16 @@ pub(crate) fn with_history(context: &egui::Context, step: usize) -> State {
             offset_px: [0.3, 0.4],
         });
         let item = Item::EarlierTemplates(earlier.collect());
-        state.cache.arrived(Key::EarlierTemplates(key.clone()), Ok(item), 0.0);
+        state.cache.store(Key::EarlierTemplates(key.clone()), Ok(item), 0.0);
         for name in [ArrayName::REFERENCE, ArrayName::MATCHED] {
             let raster = Raster::from_npy(context, name, &npy::encode(&bump(21)).unwrap()).unwrap();
-            state.cache.arrived(Key::Array(key.clone(), name), Ok(Item::Raster(Arc::new(raster))), 0.0);
+            state.cache.store(Key::Array(key.clone(), name), Ok(Item::Raster(Arc::new(raster))), 0.0);
         }
     }
     state
 }
 
-/// The decision of a stop of a commanded drive, as the server sends it.
+/// The decision at a stop of a commanded drive, as sent by the server.
 pub(crate) fn cycle(step: usize) -> serde_json::Value {
     let exact = [[0.0; 3]; 3];
     let place = json!({ "position_m": [0.0, 0.0], "heading_rad": 0.0, "covariance": exact });
@@ -144,7 +144,7 @@ pub(crate) fn cycle(step: usize) -> serde_json::Value {
 /// Loads the record of a step of the first run.
 pub(crate) fn load(state: &mut State, trace: RunStep) {
     let key = StepKey { session: "s1".to_owned(), target: 0, run: 0, step: trace.step };
-    state.cache.arrived(Key::Trace(key), Ok(Item::Trace(Arc::new(trace))), 0.0);
+    state.cache.store(Key::Trace(key), Ok(Item::Trace(Arc::new(trace))), 0.0);
 }
 
 /// A smooth hill with a hole.

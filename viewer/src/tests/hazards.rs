@@ -1,4 +1,4 @@
-//! The goodness map and the paths of a stop: fetched with the panel, named on the map, listed in the inspector.
+//! The goodness map and the paths of a stop: requested with the panel, described on the map, listed in the inspector.
 
 use std::sync::Arc;
 
@@ -63,22 +63,22 @@ fn driving(context: &egui::Context) -> State {
     if let Some(session) = &mut state.session {
         session.steering = Some(serde_json::from_value::<Steering>(steering).unwrap());
     }
-    state.took_drive("s1".to_owned(), drive);
+    state.on_drive_reply("s1".to_owned(), drive);
     state
 }
 
-/// The name of the goodness map that is wanted.
+/// The key of the requested goodness map.
 fn key(state: &mut State) -> Key {
     state.fetch_for_panels(&[Need::Hazards]);
     let is_hazards = |key: &Key| matches!(key, Key::Hazards { step: STEP, .. });
-    state.wanted().into_iter().find(is_hazards).expect("a goodness map")
+    state.needed_items().into_iter().find(is_hazards).expect("a goodness map")
 }
 
 fn with_map(context: &egui::Context) -> State {
     let mut state = driving(context);
     let raster = HazardRaster::new(context, view());
     let key = key(&mut state);
-    state.cache.arrived(key, Ok(Item::Hazards(Arc::new(raster))), 0.0);
+    state.cache.store(key, Ok(Item::Hazards(Arc::new(raster))), 0.0);
     state
 }
 
@@ -86,9 +86,9 @@ fn with_map(context: &egui::Context) -> State {
 fn the_goodness_map_is_fetched_while_a_panel_shows_it() {
     let mut state = driving(&egui::Context::default());
     let is_hazards = |key: &Key| matches!(key, Key::Hazards { step: STEP, .. });
-    assert!(!state.wanted().iter().any(is_hazards));
+    assert!(!state.needed_items().iter().any(is_hazards));
     let first = key(&mut state);
-    // Another exemption makes another map.
+    // Another exemption radius results in another map.
     if let Some((_, view)) = &mut state.driving.view
         && let Some(steering) = &mut view.steering
     {
@@ -101,8 +101,8 @@ fn the_goodness_map_is_fetched_while_a_panel_shows_it() {
 fn the_northernmost_row_is_the_first_line_of_the_picture() {
     let context = egui::Context::default();
     let raster = HazardRaster::new(&context, view());
-    let shown = raster.shown.as_ref().unwrap();
-    assert_eq!((shown.middle_m, shown.size_m), ([0.5, 0.5], [1.0, 1.0]));
+    let texture = raster.texture.as_ref().unwrap();
+    assert_eq!((texture.middle_m, texture.size_m), ([0.5, 0.5], [1.0, 1.0]));
     assert_eq!(texels(&raster.view), [100, 100, 0, UNKNOWN]);
 }
 
@@ -172,7 +172,7 @@ fn the_ground_lies_over_the_left_image_where_the_camera_sees_it() {
     );
     for (corners, percent) in &cells {
         assert_eq!(*percent, 80);
-        // Farther rows are higher in the picture, and the right of the rover is on the right.
+        // Farther rows are higher in the image, and the rover's right is on the right.
         assert!(corners[3].y < corners[0].y && corners[1].x > corners[0].x, "{corners:?}");
     }
     let behind = sightline_geometry::frames::Pose::translation(20.0, 0.0, 0.0);
@@ -185,7 +185,7 @@ fn the_layer_of_the_ground_is_listed_where_there_is_a_goodness_map_and_fetches_i
     let mut state = driving(&context);
     assert!(ground::entry(&state).is_some());
     state.fetch_for_panels(&[]);
-    let wants = |state: &State| state.wanted().iter().any(|key| matches!(key, Key::Hazards { .. }));
+    let wants = |state: &State| state.needed_items().iter().any(|key| matches!(key, Key::Hazards { .. }));
     assert!(!wants(&state), "it is hidden at first");
     state.perform(Command::ToggleLayer(Layer::Ground));
     state.fetch_for_panels(&[]);

@@ -30,7 +30,7 @@ fn a_comparison_that_is_refused_says_why() {
         let mut state = fixture::at_step(context, 2);
         let key = Key::EarlierTemplates(state.step_key(2).unwrap());
         let problem = Problem { detail: "The image of step 0 is missing.".to_owned(), ..problem(422) };
-        state.cache.arrived(key, Err(problem), 0.0);
+        state.cache.store(key, Err(problem), 0.0);
         state
     });
     shown.says("step 2 cannot be compared with earlier templates: The image of step 0 is missing.");
@@ -46,9 +46,9 @@ fn a_loaded_history_says_score_and_shift_against_the_first_template() {
 fn earlier_templates_are_fetched_only_while_they_are_looked_at() {
     let mut state = fixture::at_step(&egui::Context::default(), 1);
     let earlier = |key: &Key| matches!(key, Key::EarlierTemplates(step) if step.step == 1);
-    assert!(!state.wanted().iter().any(earlier));
+    assert!(!state.needed_items().iter().any(earlier));
     state.wants_history = true;
-    assert!(state.wanted().iter().any(earlier));
+    assert!(state.needed_items().iter().any(earlier));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Notes and exports: what they show, what they ask of the server, and that no words are lost.
+//! Notes and exports: display, requests, and that no text is lost.
 
 use sightline_api::endpoint::{Call, Endpoint};
 use sightline_api::endpoints::{AddNote, ChangeNote, ListExports, ListNotes, RemoveNote, RestoreNote};
@@ -14,8 +14,8 @@ use egui_kittest::kittest::Queryable;
 use crate::command::{Command, Stage};
 use crate::exports;
 use crate::exports::window;
-use crate::figure::wish::{Kind, Wish};
-use crate::notes::Ask;
+use crate::figure::request::{FigureFormat, FigureRequest};
+use crate::notes::NotesCommand;
 use crate::notes::panel;
 use crate::panels::pane::Pane;
 use crate::state::State;
@@ -41,8 +41,8 @@ fn noted(context: &egui::Context) -> State {
     state
 }
 
-fn do_(state: &mut State, ask: Ask) {
-    state.perform(Command::Notes(ask));
+fn perform(state: &mut State, command: NotesCommand) {
+    state.perform(Command::Notes(command));
 }
 
 fn refuse<E: Endpoint>(state: &mut State) {
@@ -63,10 +63,13 @@ fn notes_are_listed_in_their_order_and_a_click_goes_there() {
     shown.says("go to note 1: step 3, ridge, run A, judge").says("the shade moved");
     shown.says("go to note 2: step 1").says("a dusty stop");
     let commands = shown.click("go to note 1: step 3, ridge, run A, judge");
-    assert_eq!(commands, vec![Command::Notes(Ask::GoTo(4))]);
-    assert_eq!(shown.click("remove note 2"), vec![Command::Notes(Ask::Remove(7))]);
-    assert_eq!(shown.click("later in the tour: note 1"), vec![Command::Notes(Ask::Move { id: 4, place: 1 })]);
-    assert_eq!(shown.click("Pin a note here  (M)"), vec![Command::Notes(Ask::Pin)]);
+    assert_eq!(commands, vec![Command::Notes(NotesCommand::GoTo(4))]);
+    assert_eq!(shown.click("remove note 2"), vec![Command::Notes(NotesCommand::Remove(7))]);
+    assert_eq!(
+        shown.click("later in the tour: note 1"),
+        vec![Command::Notes(NotesCommand::Move { id: 4, place: 1 })]
+    );
+    assert_eq!(shown.click("Pin a note here  (M)"), vec![Command::Notes(NotesCommand::Pin)]);
     Shown::pane(Pane::Notes, |context| fixture::at_step(context, 2)).says("Loading the notes");
     let none = |context: &egui::Context| {
         let mut state = fixture::at_step(context, 2);
@@ -94,7 +97,7 @@ fn a_note_of_a_step_is_found_by_the_step_and_its_run() {
 fn the_tour_goes_through_the_notes_in_their_order_and_ends_at_its_ends() {
     let mut state = noted(&egui::Context::default());
     let mut tour = |by: isize| {
-        do_(&mut state, Ask::Tour(by));
+        perform(&mut state, NotesCommand::Tour(by));
         (state.cursor.step, state.stage)
     };
     assert_eq!(tour(1), (3, Stage::JUDGE));
@@ -108,21 +111,21 @@ fn a_note_is_pinned_to_what_is_looked_at_and_its_words_are_never_lost() {
     let mut state = noted(&egui::Context::default());
     state.take_requests();
     state.stage = Stage::MATCH_TEMPLATE;
-    do_(&mut state, Ask::Pin);
-    do_(&mut state, Ask::Write("half a thought".to_owned()));
-    do_(&mut state, Ask::Close);
+    perform(&mut state, NotesCommand::Pin);
+    perform(&mut state, NotesCommand::Write("half a thought".to_owned()));
+    perform(&mut state, NotesCommand::Close);
     assert!(state.notes.draft.is_none());
-    do_(&mut state, Ask::Pin);
+    perform(&mut state, NotesCommand::Pin);
     assert_eq!(state.notes.draft.as_ref().unwrap().text, "half a thought", "closing keeps the words");
-    do_(&mut state, Ask::Save);
+    perform(&mut state, NotesCommand::Save);
     let [new] = bodies::<AddNote>(&mut state).try_into().unwrap();
     let stage = Some("match_template".to_owned());
     assert_eq!((new.pin.target, new.pin.run, new.pin.step, &new.pin.stage), (Some(0), 0, 2, &stage));
     assert_eq!((new.text.as_str(), new.pin.pixel), ("half a thought", Some(fixture::PIXEL)));
     refuse::<AddNote>(&mut state);
     assert_eq!(state.notes.draft.as_ref().unwrap().text, "half a thought", "a refusal keeps them, too");
-    do_(&mut state, Ask::Write("  ".to_owned()));
-    do_(&mut state, Ask::Save);
+    perform(&mut state, NotesCommand::Write("  ".to_owned()));
+    perform(&mut state, NotesCommand::Save);
     assert!(state.take_requests().is_empty() && state.notes.draft.is_some(), "nothing is no note");
 }
 
@@ -130,9 +133,9 @@ fn a_note_is_pinned_to_what_is_looked_at_and_its_words_are_never_lost() {
 fn an_edit_that_came_too_late_shows_its_words_again_and_reads_the_notes() {
     let mut state = noted(&egui::Context::default());
     state.take_requests();
-    do_(&mut state, Ask::Edit(5));
-    do_(&mut state, Ask::Write("not so fine".to_owned()));
-    do_(&mut state, Ask::Save);
+    perform(&mut state, NotesCommand::Edit(5));
+    perform(&mut state, NotesCommand::Write("not so fine".to_owned()));
+    perform(&mut state, NotesCommand::Save);
     let edit = EditNote { text: Some("not so fine".to_owned()), place: None };
     let expected = Call::with_body::<ChangeNote>(&at_note(), &edit).at_revision(3);
     assert_eq!(calls::calls(&mut state), [expected]);
@@ -146,17 +149,17 @@ fn an_edit_that_came_too_late_shows_its_words_again_and_reads_the_notes() {
 fn a_removed_note_can_be_brought_back() {
     let mut state = noted(&egui::Context::default());
     state.take_requests();
-    do_(&mut state, Ask::Remove(5));
+    perform(&mut state, NotesCommand::Remove(5));
     assert_eq!(calls::calls(&mut state), [Call::to::<RemoveNote>(&at_note()).at_revision(3)]);
     let removed = |context: &egui::Context| {
         let mut state = noted(context);
-        do_(&mut state, Ask::Remove(5));
+        perform(&mut state, NotesCommand::Remove(5));
         state
     };
     let mut shown = Shown::pane(Pane::Notes, removed);
     shown.says("A note at step 2 was removed");
-    assert_eq!(shown.click("bring the removed note back"), vec![Command::Notes(Ask::Restore(5))]);
-    do_(&mut state, Ask::Restore(5));
+    assert_eq!(shown.click("bring the removed note back"), vec![Command::Notes(NotesCommand::Restore(5))]);
+    perform(&mut state, NotesCommand::Restore(5));
     assert_eq!(calls::calls(&mut state), [Call::to::<RestoreNote>(&at_note())]);
 }
 
@@ -165,14 +168,14 @@ fn notes_that_changed_elsewhere_are_read_again() {
     let mut state = fixture::nothing();
     let view = noted(&egui::Context::default()).session.unwrap();
     state.adopt(view, false);
-    let asked = |state: &mut State| calls_of::<ListNotes>(state).len();
-    assert_eq!(asked(&mut state), 1, "the notes of an opened session are read");
+    let list_calls = |state: &mut State| calls_of::<ListNotes>(state).len();
+    assert_eq!(list_calls(&mut state), 1, "the notes of an opened session are read");
     answer::<ListNotes>(&mut state, &[note(1, 0, None, "x")]);
     assert_eq!(state.notes_at(0).len(), 1);
-    state.told(Event::NotesChanged { session: "other".to_owned() });
-    assert_eq!(asked(&mut state), 0);
-    state.told(Event::NotesChanged { session: "s1".to_owned() });
-    assert_eq!(asked(&mut state), 1);
+    state.apply_event(Event::NotesChanged { session: "other".to_owned() });
+    assert_eq!(list_calls(&mut state), 0);
+    state.apply_event(Event::NotesChanged { session: "s1".to_owned() });
+    assert_eq!(list_calls(&mut state), 1);
 }
 
 #[test]
@@ -181,20 +184,20 @@ fn the_editor_names_the_place_and_saves() {
         [700.0, 500.0],
         |context| {
             let mut state = noted(context);
-            do_(&mut state, Ask::Pin);
-            do_(&mut state, Ask::Write("done".to_owned()));
+            perform(&mut state, NotesCommand::Pin);
+            perform(&mut state, NotesCommand::Write("done".to_owned()));
             state
         },
         panel::editor,
     );
     shown.says("NEW NOTE AT STEP 2");
-    assert_eq!(shown.click("Save note"), vec![Command::Notes(Ask::Save)]);
+    assert_eq!(shown.click("Save note"), vec![Command::Notes(NotesCommand::Save)]);
 }
 
 /// The window of exports with a file.
 fn opened(context: &egui::Context) -> State {
     let mut state = noted(context);
-    state.perform(Command::Exports(exports::Ask::Open));
+    state.perform(Command::Exports(exports::ExportsCommand::Open));
     assert!(!calls_of::<ListExports>(&mut state).is_empty());
     state.exports.panes = vec![Pane::Map];
     state.exports.entries = Some(vec![ExportEntry {
@@ -212,10 +215,10 @@ fn opened(context: &egui::Context) -> State {
 #[test]
 fn the_export_window_lists_files_with_sizes_and_ways_to_copy_them() {
     let mut shown = Shown::new([900.0, 800.0], opened, window::show);
-    // A long window finds its place within a few frames.
+    // A long window is positioned within a few frames.
     shown.harness.run_steps(4);
     shown.says("Rows, CSV").says("1 kB").says("One line a step.").says("pick ridge");
-    let download = exports::Ask::Download("sessions/s1/exports/rows.csv".to_owned());
+    let download = exports::ExportsCommand::Download("sessions/s1/exports/rows.csv".to_owned());
     assert_eq!(shown.click("download: Rows, CSV"), vec![Command::Exports(download)]);
     let copied = |shown: &mut Shown<'_>, label: &str| {
         shown.harness.get_by_label(label).click();
@@ -236,9 +239,12 @@ fn the_export_window_lists_files_with_sizes_and_ways_to_copy_them() {
         )
     );
     let figure = shown.click("figure of Map, site frame");
-    let wish = Wish { pane: Pane::Map, kind: Kind::Png(2) };
-    assert_eq!(figure, vec![Command::Exports(exports::Ask::Figure(wish))]);
-    assert_eq!(shown.click("SVG"), vec![Command::Exports(exports::Ask::Kind(Kind::Svg))]);
+    let request = FigureRequest { pane: Pane::Map, kind: FigureFormat::Png(2) };
+    assert_eq!(figure, vec![Command::Exports(exports::ExportsCommand::Figure(request))]);
+    assert_eq!(
+        shown.click("SVG"),
+        vec![Command::Exports(exports::ExportsCommand::Format(FigureFormat::Svg))]
+    );
 }
 
 #[test]
@@ -270,7 +276,7 @@ fn the_export_window_rests_from_the_second_frame_on() {
         }
     });
     is_open.set(true);
-    // The frame of the key and the one that follows it; without an event no other one comes.
+    // The frame of the key and the next one; without another event no further one is drawn.
     shown.harness.run_steps(2);
     let close = |shown: &Shown<'_>| shown.harness.get_by_label("Close").rect();
     let before = close(&shown);
@@ -300,7 +306,7 @@ fn the_buttons_of_a_note_leave_its_title_free() {
 #[test]
 fn the_plain_page_of_what_is_looked_at_is_opened() {
     let mut state = noted(&egui::Context::default());
-    state.perform(Command::Exports(exports::Ask::PlainPage));
+    state.perform(Command::Exports(exports::ExportsCommand::PlainPage));
     let expected = "http://localhost/api/v1/sessions/s1/targets/0/runs/0/steps/2/page";
     assert!(state.take_effects().contains(&Effect::OpenUrl(expected.to_owned())));
 }

@@ -1,10 +1,10 @@
-//! Smoke tests of the panels from a fixed drive: what each says when it has data, and when it has none.
+//! Smoke tests of the panels from a fixed drive: the display of each with data and without.
 
 mod accuracy;
 #[path = "../compare/tests/mod.rs"]
 mod compare;
 #[path = "../breakpoints/tests.rs"]
-pub(crate) mod ask;
+pub(crate) mod breakpoints;
 mod cameras;
 pub(crate) mod feature_run;
 mod features;
@@ -42,7 +42,7 @@ mod undo;
 mod why_card;
 #[path = "../why/follow_tests.rs"]
 mod following;
-mod pointed;
+mod hovered;
 #[path = "../files/tests.rs"]
 mod opening;
 #[path = "../files/recording_tests.rs"]
@@ -63,7 +63,7 @@ use crate::panels::{bars, timeline};
 use crate::state::{Progress, State};
 use crate::theme;
 
-/// A panel on a screen of its own, with the commands that it gave.
+/// A panel on a separate screen, with its commands.
 pub(crate) struct Shown<'a> {
     harness: Harness<'a, Vec<Command>>,
 }
@@ -74,13 +74,13 @@ impl<'a> Shown<'a> {
         state: impl FnOnce(&egui::Context) -> State + 'a,
         show: impl Fn(&mut egui::Ui, &State, &mut Vec<Command>) + 'a,
     ) -> Self {
-        // Textures belong to the context that shows them, so the state is made in the first frame.
+        // Textures belong to the context that shows them, so that the state is created in the first frame.
         let mut make = Some(state);
         let mut state: Option<State> = None;
         let mut harness = Harness::builder().with_size(size).build_ui_state(
             move |ui, out: &mut Vec<Command>| {
                 if let Some(make) = make.take() {
-                    theme::apply(ui.ctx(), theme::Looks::Dark);
+                    theme::apply(ui.ctx(), theme::ColourTheme::Dark);
                     state = Some(make(ui.ctx()));
                 }
                 if let Some(state) = &state {
@@ -119,7 +119,7 @@ impl<'a> Shown<'a> {
         self
     }
 
-    /// Whether a text or control on the screen is called so.
+    /// Whether a text or control on the screen has this name.
     pub(crate) fn has(&self, label: &str) -> bool {
         self.harness.query_all_by_label(label).count() > 0
     }
@@ -127,14 +127,14 @@ impl<'a> Shown<'a> {
     pub(crate) fn click(&mut self, label: &str) -> Vec<Command> {
         self.harness.get_by_label(label).click();
         self.harness.run_steps(2);
-        self.asked()
+        self.take_commands()
     }
 
-    /// What was asked for since the last time, without what the pointer was over meanwhile.
-    fn asked(&mut self) -> Vec<Command> {
-        let mut asked = std::mem::take(self.harness.state_mut());
-        crate::state::pointed::taken_out(&mut asked);
-        asked
+    /// The commands since the last call, without hovered locations.
+    fn take_commands(&mut self) -> Vec<Command> {
+        let mut commands = std::mem::take(self.harness.state_mut());
+        crate::state::hovered::remove_hovered(&mut commands);
+        commands
     }
 }
 

@@ -1,4 +1,4 @@
-//! The panel “Odometry”, its corners on the left image, and the reasons where there is none.
+//! The panel “Odometry”, its corners on the left image, and the explanations where there is no odometry.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use sightline_track::gate::Gate;
 use sightline_vision::image::{GrayImage, io};
 
 use super::{Shown, fixture};
-use crate::cache::{Eye, Item, Key};
+use crate::cache::{ImageSide, Item, Key};
 use crate::command::{Command, Layer, Stage};
 use crate::drawing::raster::Raster;
 use crate::net::request::Request;
@@ -25,10 +25,10 @@ use crate::panels::pane::{Need, Pane};
 use crate::state::State;
 use crate::theme;
 
-/// The stop that is looked at.
+/// The cursor's stop.
 const STEP: usize = 3;
 
-/// A motion of 50 cm ahead by the wheels from `before`, of which vision says that a part slipped, with a turn to the right.
+/// A motion of 50 cm ahead by the wheels from `before`, with slip by vision, and a turn to the right.
 pub(crate) fn measured(before: &Pose, slip: f64, turn_deg: f64, accepted: bool) -> MeasuredMotion {
     let turn = nalgebra::UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn_deg.to_radians());
     let before_from_after = Pose::from_parts(Vector3::new(0.5 * (1.0 - slip), 0.0, 0.0).into(), turn);
@@ -82,7 +82,7 @@ pub(crate) fn measured(before: &Pose, slip: f64, turn_deg: f64, accepted: bool) 
     }
 }
 
-/// One corner of every fate, 100 px apart in the image before; matches are 40 px further down.
+/// One corner of every fate, 100 px apart in the previous image; matches are 40 px lower.
 fn table() -> Vec<OdometryCorner> {
     let fates = [
         Fate::Inlier,
@@ -108,7 +108,7 @@ fn table() -> Vec<OdometryCorner> {
     fates.into_iter().enumerate().map(corner).collect()
 }
 
-/// A drive on commands with odometry at its stops, at [`STEP`].
+/// A commanded drive with odometry at its stops, at [`STEP`].
 fn driven(context: &egui::Context, accepted: bool) -> State {
     let mut state = fixture::at_step(context, STEP);
     let steering = json!({ "target": 0, "run": 0 });
@@ -127,21 +127,21 @@ fn driven(context: &egui::Context, accepted: bool) -> State {
     state
 }
 
-/// The same with its corners and both images.
+/// The same with its corners and both images loaded.
 fn loaded(context: &egui::Context, accepted: bool) -> State {
     let mut state = driven(context, accepted);
     let image = GrayImage::from_pixel(64, 64, image::Luma([0.4]));
     let bytes = io::encode_png_u8(&image).unwrap();
     for step in [STEP - 1, STEP] {
         let raster = Raster::from_png(context, &format!("left {step}"), &bytes).unwrap();
-        let key = state.image_key(step, Eye::Left).unwrap();
-        state.cache.arrived(key, Ok(Item::Raster(Arc::new(raster))), 0.0);
+        let key = state.image_key(step, ImageSide::Left).unwrap();
+        state.cache.store(key, Ok(Item::Raster(Arc::new(raster))), 0.0);
     }
     let measured = state.measured_motion(STEP).unwrap().clone();
     let settings = measured.preset.settings();
     let odometry = StopOdometry { settings, measured, corners: table() };
     let key = Key::Odometry { traverse: "drive".to_owned(), step: STEP };
-    state.cache.arrived(key, Ok(Item::Odometry(Arc::new(odometry))), 0.0);
+    state.cache.store(key, Ok(Item::Odometry(Arc::new(odometry))), 0.0);
     state
 }
 
@@ -263,14 +263,14 @@ fn corners_are_read_only_where_they_are_shown() {
     let context = egui::Context::default();
     let is_wanted = |state: &mut State| {
         let key = Key::Odometry { traverse: "drive".to_owned(), step: STEP };
-        state.wanted().contains(&key)
+        state.needed_items().contains(&key)
     };
     let mut state = driven(&context, true);
     assert!(!is_wanted(&mut state));
     state.fetch_for_panels(&[Need::Odometry]);
     assert!(is_wanted(&mut state));
-    let before = state.image_key(STEP - 1, Eye::Left).unwrap();
-    assert!(state.wanted().contains(&before));
+    let before = state.image_key(STEP - 1, ImageSide::Left).unwrap();
+    assert!(state.needed_items().contains(&before));
     state.fetch_for_panels(&[]);
     state.perform(Command::ToggleLayer(Layer::Odometry));
     assert!(is_wanted(&mut state));

@@ -9,9 +9,9 @@ use sightline_track::trace::StepKind;
 
 use super::Shown;
 use super::fixture::{self, trace};
-use crate::cache::{Eye, Key, Slot};
+use crate::cache::{ImageSide, Key, Slot};
 use crate::command::{Command, Stage};
-use crate::driving::{Ask, panel};
+use crate::driving::{DrivingCommand, panel};
 use crate::net::request::Request;
 use crate::panels::bars;
 use crate::panels::pane::Pane;
@@ -119,8 +119,8 @@ fn images_that_are_not_taken_are_not_asked_for_and_their_panel_says_why() {
         [(CycleStage::Predict, false), (CycleStage::Capture, false), (CycleStage::Locate, true)]
     {
         let state = paused(&context, before);
-        let left = state.image_key(STOP, Eye::Left).unwrap();
-        assert_eq!(state.wanted().contains(&left), is_taken, "{}", before.word());
+        let left = state.image_key(STOP, ImageSide::Left).unwrap();
+        assert_eq!(state.needed_items().contains(&left), is_taken, "{}", before.word());
     }
     let panel = Shown::new(
         [500.0, 400.0],
@@ -138,7 +138,7 @@ fn a_step_that_goes_on_replaces_its_row_and_its_record() {
     let mut state = paused(&context, CycleStage::Judge);
     let _ = state.take_requests();
     assert!(!state.is_running(), "a run that waits with its drive is not computed");
-    state.told(Event::RunProgress {
+    state.apply_event(Event::RunProgress {
         session: "s1".to_owned(),
         target: 0,
         run: 0,
@@ -156,40 +156,43 @@ fn a_step_that_goes_on_replaces_its_row_and_its_record() {
         tail.rows = vec![row];
         tail
     };
-    state.took_rows("s1", 0, STOP, tail(begun(CycleStage::Judge).row()));
+    state.on_rows_reply("s1", 0, STOP, tail(begun(CycleStage::Judge).row()));
     assert!(matches!(state.trace_at(STOP), Slot::Ready(_)), "nothing has changed");
-    state.took_rows("s1", 0, STOP, tail(trace(STOP).row()));
+    state.on_rows_reply("s1", 0, STOP, tail(trace(STOP).row()));
     assert_eq!(state.run().unwrap().rows.len(), STOP + 1);
     assert!(matches!(state.trace_at(STOP), Slot::Absent), "the record is older than the row");
     let key = state.step_key(STOP).unwrap();
-    assert!(state.wanted().contains(&Key::Trace(key.clone())) && state.wanted().contains(&Key::Arrays(key)));
+    assert!(
+        state.needed_items().contains(&Key::Trace(key.clone()))
+            && state.needed_items().contains(&Key::Arrays(key))
+    );
 }
 
 #[test]
 fn the_panel_continues_to_the_chosen_stage_and_steps_by_one() {
     let mut shown = Shown::new([700.0, 500.0], |context| paused(context, CycleStage::Judge), panel::show);
     shown.says("paused at stop 3: after locate, before judge");
-    assert_eq!(shown.click("Next stage"), vec![Command::Drive(Ask::NextStage)]);
-    assert_eq!(shown.click("Continue"), vec![Command::Drive(Ask::Continue)]);
+    assert_eq!(shown.click("Next stage"), vec![Command::Drive(DrivingCommand::NextStage)]);
+    assert_eq!(shown.click("Continue"), vec![Command::Drive(DrivingCommand::Continue)]);
 
-    let told = |ask: Ask, change: fn(&mut State)| {
+    let sent = |command: DrivingCommand, change: fn(&mut State)| {
         let mut state = paused(&egui::Context::default(), CycleStage::Judge);
         change(&mut state);
         let _ = state.take_requests();
-        state.perform(Command::Drive(ask));
+        state.perform(Command::Drive(command));
         let body = bodies(&mut state).pop().unwrap();
         (body["pause_at"].clone(), body["pause"].clone())
     };
     let before = |stage: &str| json!({ "when": "before", "stage": stage });
-    assert_eq!(told(Ask::NextStage, |_| ()), (json!(STOP), before("update")));
-    assert_eq!(told(Ask::Continue, |_| ()), (json!(STOP), Value::Null), "before `drive`");
+    assert_eq!(sent(DrivingCommand::NextStage, |_| ()), (json!(STOP), before("update")));
+    assert_eq!(sent(DrivingCommand::Continue, |_| ()), (json!(STOP), Value::Null), "before `drive`");
     assert_eq!(
-        told(Ask::Continue, |state| state.driving.pause.pause.stage = CycleStage::Locate),
+        sent(DrivingCommand::Continue, |state| state.driving.pause.pause.stage = CycleStage::Locate),
         (json!(STOP + 1), before("locate"))
     );
     let once = |state: &mut State| {
         state.driving.pause.pause.stage = CycleStage::Locate;
         state.driving.pause.is_every_stop = false;
     };
-    assert_eq!(told(Ask::Continue, once), (Value::Null, Value::Null), "it drives on");
+    assert_eq!(sent(DrivingCommand::Continue, once), (Value::Null, Value::Null), "it drives on");
 }

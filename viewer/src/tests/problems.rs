@@ -1,13 +1,13 @@
-//! What a person sees of a problem: the card, the list of messages, and a server that is gone.
+//! Display of problems: the card, the list of messages, and an unreachable server.
 
 use sightline_api::endpoint::Call;
 use sightline_api::endpoints::{ForkRun, MoveCursor, RemoveTarget, ShowSession};
 use sightline_api::wire::{Problem, Received};
 use sightline_session::Cursor;
 
-use crate::cache::Eye;
+use crate::cache::ImageSide;
 use crate::command::{Command, Go, Mode};
-use crate::files::Ask;
+use crate::files::FilesCommand;
 use crate::net::events::Connection;
 use crate::panels::card;
 use crate::panels::pane::Pane;
@@ -77,7 +77,7 @@ fn a_file_that_cannot_be_opened_has_a_card_of_its_own() {
 }
 
 #[test]
-fn a_deed_that_no_server_heard_of_is_said_to_have_come_to_nothing() {
+fn a_change_without_a_server_is_reported_as_lost() {
     let mut state = fixture::at_step(&egui::Context::default(), 2);
     state.connected(Connection::Gone { attempts: 3 });
     let gone = || Problem::new(0, "unreachable", "", "The server does not answer.");
@@ -100,7 +100,7 @@ fn the_cursor_is_kept_when_a_server_comes_back_that_forgot_its_last_move() {
     state.perform(Command::Go(Go::By(2)));
     state.connected(Connection::Live);
     assert!(calls(&mut state).contains(&Call::to::<ShowSession>(&at_session())));
-    // The server tells of a place where the page was never: it was ended before it had written the last move.
+    // The server reports an outdated cursor: it was ended before it had stored the last move.
     answer::<MoveCursor>(&mut state, &Cursor::default());
     let mut view = state.session.clone().unwrap();
     view.cursor.step = 1;
@@ -108,7 +108,7 @@ fn the_cursor_is_kept_when_a_server_comes_back_that_forgot_its_last_move() {
     assert_eq!(state.cursor.step, 4);
     let again: Vec<usize> = bodies::<MoveCursor>(&mut state).iter().map(|cursor| cursor.step).collect();
     assert_eq!(again, [4]);
-    // Later moves by others count again.
+    // Later moves by other pages are adopted again.
     answer::<MoveCursor>(&mut state, &Cursor::default());
     view.cursor.step = 3;
     state.read_session("s1".to_owned());
@@ -120,21 +120,21 @@ fn the_cursor_is_kept_when_a_server_comes_back_that_forgot_its_last_move() {
 fn an_image_that_cannot_be_read_names_file_and_remedy_and_can_be_tried_again() {
     let broken = |context: &egui::Context| {
         let mut state = fixture::at_step(context, 2);
-        let key = state.image_key(2, Eye::Left).unwrap();
+        let key = state.image_key(2, ImageSide::Left).unwrap();
         let problem = Problem::new(422, "file", "", "cannot read left_0002.png: no such file");
         let problem = Problem { hint: Some("Put the file back.".to_owned()), ..problem };
-        state.cache.arrived(key, Err(problem), 0.0);
+        state.cache.store(key, Err(problem), 0.0);
         state
     };
     let mut shown = Shown::pane(Pane::Left, broken);
     shown
         .says("The left image of step 2 cannot be shown: cannot read left_0002.png")
         .says("Put the file back.");
-    let again = vec![Command::Files(Ask::TryAgain)];
+    let again = vec![Command::Files(FilesCommand::TryAgain)];
     assert_eq!(shown.click("try the left image of step 2 again"), again);
     let mut state = broken(&egui::Context::default());
-    let key = state.image_key(2, Eye::Left).unwrap();
-    assert!(state.cache.want(std::slice::from_ref(&key), |_| true, 1.0).is_empty(), "a refusal stays");
-    state.perform(Command::Files(Ask::TryAgain));
-    assert_eq!(state.cache.want(std::slice::from_ref(&key), |_| true, 1.0), vec![key]);
+    let key = state.image_key(2, ImageSide::Left).unwrap();
+    assert!(state.cache.request(std::slice::from_ref(&key), |_| true, 1.0).is_empty(), "a refusal stays");
+    state.perform(Command::Files(FilesCommand::TryAgain));
+    assert_eq!(state.cache.request(std::slice::from_ref(&key), |_| true, 1.0), vec![key]);
 }

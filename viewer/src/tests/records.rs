@@ -1,4 +1,4 @@
-//! A number that a stage declares is in the views of the page, although none of them names it.
+//! A number that a stage declares appears in the views of the page, although none of them names it.
 
 use sightline_session::records::{self, StageQuantity};
 
@@ -6,9 +6,9 @@ use super::{Shown, fixture};
 use crate::command::{Command, Stage};
 use crate::panels::pane::Pane;
 use crate::panels::plots;
-use crate::why::Ask;
+use crate::why::WhyCommand;
 
-/// The number: declared in the `impl Record` of its stage, and no field of the evidence.
+/// The number: declared in the `impl Record` of its stage, but not a field of the evidence.
 const NAME: &str = "match_template.match_sigma_px";
 
 #[test]
@@ -20,7 +20,7 @@ fn one_declaration_puts_a_number_into_inspector_and_plots() {
         state
     });
     shown.says("match sigma").says(&format!("= {}", quantity.declared().formula));
-    let why = Command::Why(Ask::Value { step: 2, value: NAME.to_owned() });
+    let why = Command::Why(WhyCommand::Value { step: 2, value: NAME.to_owned() });
     assert_eq!(shown.click("match sigma"), vec![why]);
     let names: Vec<String> = records::stages()
         .iter()

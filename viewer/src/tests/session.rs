@@ -1,4 +1,4 @@
-//! What commands and answers do to the state: cursor, targets, refusals and what is asked of the server.
+//! Effects of commands and replies on the state: cursor, targets, refusals and requests.
 
 use sightline_api::endpoint::Call;
 use sightline_api::endpoints::{
@@ -14,10 +14,10 @@ use sightline_session::compare::RunName;
 use sightline_session::step::StepRow;
 use sightline_session::view::RunView;
 
-use crate::cache::{Eye, Key, Slot};
+use crate::cache::{ImageSide, Key, Slot};
 use crate::command::{Command, Go, Mode};
 use crate::net::events::Connection;
-use crate::net::request::{Arrived, Request};
+use crate::net::request::{CompletedRequest, Request};
 use crate::state::{State, events};
 use crate::tests::calls::{answer, at_session, bodies, calls, calls_of, refuse};
 use crate::tests::fixture::{STOPS, at_step, nothing, without_target};
@@ -26,7 +26,7 @@ fn loaded(step: usize) -> State {
     at_step(&egui::Context::default(), step)
 }
 
-/// As [`loaded`], with the cursor known to the server.
+/// As [`loaded`], with the cursor sent to the server.
 fn settled(step: usize) -> State {
     let mut state = loaded(step);
     assert_eq!(moves(&mut state), [step]);
@@ -34,12 +34,12 @@ fn settled(step: usize) -> State {
     state
 }
 
-/// Takes all requests out; returns the steps to which the server's cursor is moved.
+/// Removes all requests; returns the steps to which the server's cursor is moved.
 fn moves(state: &mut State) -> Vec<usize> {
     bodies::<MoveCursor>(state).into_iter().map(|cursor| cursor.step).collect()
 }
 
-/// The server takes the cursor that is under way.
+/// The server acknowledges the pending cursor.
 fn take_cursor(state: &mut State) {
     answer::<MoveCursor>(state, &Cursor::default());
 }
@@ -147,14 +147,14 @@ fn an_answer_from_before_the_cursor_was_taken_does_not_move_it_back() {
     let mut state = settled(0);
     state.perform(Command::Go(Go::By(1)));
     assert_eq!(moves(&mut state), [1]);
-    state.told(Event::SessionChanged { session: "s1".to_owned() });
+    state.apply_event(Event::SessionChanged { session: "s1".to_owned() });
     assert_eq!(calls(&mut state), [Call::to::<ShowSession>(&at_session())]);
     let mut view = state.session.clone().unwrap();
     view.cursor = Cursor { target: Some(0), run: 0, step: 0 };
     take_cursor(&mut state);
     answer::<ShowSession>(&mut state, &view);
     assert_eq!(state.cursor.step, 1, "the session was read before the server took the cursor");
-    state.told(Event::SessionChanged { session: "s1".to_owned() });
+    state.apply_event(Event::SessionChanged { session: "s1".to_owned() });
     assert_eq!(calls(&mut state), [Call::to::<ShowSession>(&at_session())]);
     view.cursor.step = 4;
     answer::<ShowSession>(&mut state, &view);
@@ -176,14 +176,14 @@ fn progress_of_a_run_reads_the_session_again_and_ends() {
     };
     let rows = |state: &State| state.run().unwrap().rows.len();
     let (had, whole) = (rows(&state), state.run().unwrap().clone());
-    state.told(progress(false));
+    state.apply_event(progress(false));
     assert_eq!(state.run_progress().unwrap().k, 5);
     let rows_from = |from_row: usize| {
         let at = AtRun { session: "s1".to_owned(), target: 0, run: 0 };
         Call::with_query::<ShowRun>(&at, &FirstRow { from_row })
     };
     assert_eq!(calls(&mut state), [rows_from(had)], "only the new rows are read");
-    state.told(progress(true));
+    state.apply_event(progress(true));
     assert!(state.run_progress().is_none());
     assert!(state.take_requests().is_empty(), "one question at a time");
     let new = StepRow { step: had, ..whole.rows[had - 1].clone() };
@@ -192,7 +192,7 @@ fn progress_of_a_run_reads_the_session_again_and_ends() {
     assert_eq!(rows(&state), had + 1);
     assert_eq!(state.run().unwrap().rows.last(), Some(&new));
     assert!(state.run().unwrap().complete);
-    // The run ended while the rows were read: the rows until then are read too, but not added twice.
+    // The run ended while the rows were read: the rows until then are also read, but not added twice.
     assert_eq!(calls_of::<ShowRun>(&mut state), [rows_from(had + 1)]);
     refuse::<ShowRun>(&mut state, problem(404));
     assert!(calls(&mut state).contains(&Call::to::<ShowSession>(&at_session())), "the run may be removed");
@@ -209,7 +209,7 @@ fn progress_of_a_run_reads_the_session_again_and_ends() {
 #[test]
 fn a_cursor_that_another_page_moved_is_followed_and_the_own_one_is_not_read_back() {
     let mut state = settled(0);
-    let told = |step: usize| Event::CursorMoved {
+    let cursor_moved = |step: usize| Event::CursorMoved {
         session: "s1".to_owned(),
         cursor: Cursor { target: Some(0), run: 0, step },
     };
@@ -219,26 +219,26 @@ fn a_cursor_that_another_page_moved_is_followed_and_the_own_one_is_not_read_back
     let reading = [Call::to::<ShowCursor>(&at_session())];
     state.perform(Command::Go(Go::By(1)));
     assert_eq!(moves(&mut state), [1]);
-    state.told(told(1));
+    state.apply_event(cursor_moved(1));
     take_cursor(&mut state);
-    state.told(told(1));
+    state.apply_event(cursor_moved(1));
     assert!(state.take_requests().is_empty(), "that is this page's own cursor");
-    // Another page goes to step 4; what is told late does not count, what is read does.
-    state.told(told(3));
+    // Another page goes to step 4; a late event is ignored, a read is adopted.
+    state.apply_event(cursor_moved(3));
     assert_eq!(calls(&mut state), reading);
     read(&mut state, 4);
     assert_eq!(state.cursor.step, 4);
     assert!(state.take_requests().is_empty(), "and is not sent back");
-    // An answer that crossed a cursor of this page may be older than that.
-    state.told(told(2));
+    // A reply that crossed a cursor of this page may be older than that cursor.
+    state.apply_event(cursor_moved(2));
     assert_eq!(calls(&mut state), reading);
     state.perform(Command::Go(Go::By(1)));
     assert_eq!(moves(&mut state), [5]);
     take_cursor(&mut state);
     read(&mut state, 2);
     assert_eq!(state.cursor.step, 5);
-    // Nor does a cursor of another session count.
-    state.told(told(3));
+    // A cursor of another session is ignored too.
+    state.apply_event(cursor_moved(3));
     assert_eq!(calls(&mut state), reading);
     state.session.as_mut().unwrap().id = "s2".to_owned();
     read(&mut state, 3);
@@ -246,18 +246,18 @@ fn a_cursor_that_another_page_moved_is_followed_and_the_own_one_is_not_read_back
 }
 
 #[test]
-fn what_is_wanted_begins_with_the_cursors_step_and_reaches_to_its_neighbours() {
+fn needed_items_start_with_the_cursor_then_its_neighbours() {
     let state = loaded(2);
-    let wanted = state.wanted();
+    let wanted = state.needed_items();
     let key = state.step_key(2).unwrap();
     assert_eq!(wanted[0], Key::Trace(key.clone()));
     assert_eq!(wanted[1], Key::Arrays(key));
     assert!(wanted.contains(&Key::Trace(state.step_key(1).unwrap())));
     assert!(wanted.contains(&Key::Trace(state.step_key(3).unwrap())));
-    let last = loaded(STOPS - 2).wanted();
-    let unrendered = state.image_key(STOPS - 1, Eye::Left).unwrap();
+    let last = loaded(STOPS - 2).needed_items();
+    let unrendered = state.image_key(STOPS - 1, ImageSide::Left).unwrap();
     assert!(!last.contains(&unrendered), "rendering ahead is the server's to decide");
-    assert!(loaded(STOPS - 1).wanted().contains(&unrendered), "but what is looked at is asked for");
+    assert!(loaded(STOPS - 1).needed_items().contains(&unrendered), "but what is looked at is asked for");
 }
 
 #[test]
@@ -280,12 +280,15 @@ fn loaded_steps_stay_when_the_server_goes_and_all_is_asked_again_when_it_comes_b
 fn a_stop_that_was_rendered_is_asked_for_again() {
     let mut state = without_target();
     state.cursor.step = STOPS - 1;
-    let key = state.image_key(STOPS - 1, Eye::Left).unwrap();
-    state.cache.want(std::slice::from_ref(&key), |_| true, 0.0);
-    state.arrived(Arrived { request: Request::Item(key.clone()), outcome: Err(problem(503)) }, 0.0);
-    assert!(state.cache.want(std::slice::from_ref(&key), |_| true, 0.1).is_empty());
+    let key = state.image_key(STOPS - 1, ImageSide::Left).unwrap();
+    state.cache.request(std::slice::from_ref(&key), |_| true, 0.0);
+    state.apply_reply(
+        CompletedRequest { request: Request::Item(key.clone()), outcome: Err(problem(503)) },
+        0.0,
+    );
+    assert!(state.cache.request(std::slice::from_ref(&key), |_| true, 0.1).is_empty());
     let (traverse, ready) = ("drive".to_owned(), Some(STOPS - 1));
-    state.told(Event::RenderProgress { traverse, k: STOPS, n: STOPS, ready });
-    assert_eq!(state.cache.want(std::slice::from_ref(&key), |_| true, 0.1), vec![key]);
+    state.apply_event(Event::RenderProgress { traverse, k: STOPS, n: STOPS, ready });
+    assert_eq!(state.cache.request(std::slice::from_ref(&key), |_| true, 0.1), vec![key]);
     assert!(state.stop().unwrap().ready && state.rendering.is_none());
 }

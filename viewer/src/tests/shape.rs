@@ -1,4 +1,4 @@
-//! A run that asks the shape: the panel about it with all its parts, its marks on the left image, its gates and stages.
+//! A run with registration by shape: its panel with all parts, its marks on the left image, its gates and stages.
 
 use egui_kittest::kittest::Queryable;
 use sightline_track::settings::TrackerKind;
@@ -8,18 +8,18 @@ use crate::command::{Command, Layer, Stage};
 use crate::layout::show_pane;
 use crate::panels::pane::Pane;
 use crate::panels::{bars, inspector};
-use crate::shape_view::{Part, ShapeView};
+use crate::shape_view::{ShapePart, ShapeView};
 use crate::state::State;
 use crate::tests::shape_run;
 use crate::tests::shape_run::{HAND_OFF, REFUSED};
 use crate::tests::{Shown, fixture};
 
 /// The panel with a part of a step of the combined tracker.
-fn part(part: Part, step: usize) -> Shown<'static> {
+fn part(part: ShapePart, step: usize) -> Shown<'static> {
     with(part, step, |_| {})
 }
 
-fn with(part: Part, step: usize, change: fn(&mut State)) -> Shown<'static> {
+fn with(part: ShapePart, step: usize, change: fn(&mut State)) -> Shown<'static> {
     let state = move |context: &egui::Context| {
         let mut state = shape_run::at_step(context, TrackerKind::Combined, step);
         state.shape_view.part = part;
@@ -40,7 +40,7 @@ fn left_image(step: usize) -> Shown<'static> {
 
 #[test]
 fn the_surface_gives_both_pictures_with_units_and_what_became_of_the_pixels() {
-    let shown = part(Part::Surface, 2);
+    let shown = part(ShapePart::Surface, 2);
     shown.says("disparity, px, from 12.0 px to").says("range from the left camera, m, from");
     shown.says("80 × 60 px; one of 2 × 2 is shown").says("900 vertices, 1700 triangles").says("2.1 mm rms");
     for word in ["found", "outside", "no texture", "not unique", "left–right", "speckle", "out of range"] {
@@ -51,7 +51,7 @@ fn the_surface_gives_both_pictures_with_units_and_what_became_of_the_pixels() {
 
 #[test]
 fn the_sensor_shows_the_errors_with_one_limit_and_says_what_remained() {
-    let shown = part(Part::Sensor, 2);
+    let shown = part(ShapePart::Sensor, 2);
     shown.says("earlier surface, depth, from 4.00 m to 4.15 m");
     for title in ["error at the start", "after the coarse search", "at the end"] {
         shown.says(&format!("{title}, from -10.0 cm to 10.0 cm"));
@@ -62,7 +62,7 @@ fn the_sensor_shows_the_errors_with_one_limit_and_says_what_remained() {
 
 #[test]
 fn a_handle_of_the_histogram_sets_the_limit_of_the_colours_and_a_button_takes_it_back() {
-    let mut shown = part(Part::Sensor, 2);
+    let mut shown = part(ShapePart::Sensor, 2);
     let grip = shown.harness.get_by_label("upper limit of the colours").rect().center();
     let to = grip - egui::vec2(100.0, 0.0);
     shown.harness.drag_at(grip);
@@ -80,15 +80,15 @@ fn a_handle_of_the_histogram_sets_the_limit_of_the_colours_and_a_button_takes_it
     // The axis of some 880 points ends at 12.5 cm on both sides.
     assert!((last - (0.1 - 100.0 * 0.125 / 440.0)).abs() < 0.002, "{last}");
 
-    let mut set = with(Part::Sensor, 2, |state| state.shape_view.error_limit_m = Some(0.02));
+    let mut set = with(ShapePart::Sensor, 2, |state| state.shape_view.error_limit_m = Some(0.02));
     set.says("colours end at ± 2.00 cm").says("at the end, from -2.00 cm to 2.00 cm");
-    let back = Command::SetShapeView(ShapeView { part: Part::Sensor, ..ShapeView::default() });
+    let back = Command::SetShapeView(ShapeView { part: ShapePart::Sensor, ..ShapeView::default() });
     assert_eq!(set.click("Automatic limit"), vec![back]);
 }
 
 #[test]
 fn the_search_gives_its_range_its_best_and_the_way_of_the_refinement() {
-    let shown = part(Part::Search, 2);
+    let shown = part(ShapePart::Search, 2);
     shown
         .says("9 × 9 shifts of 43.")
         .says("mm, to ± 17.5 cm, as far as the start can be off; half width 25.0 cm");
@@ -98,7 +98,7 @@ fn the_search_gives_its_range_its_best_and_the_way_of_the_refinement() {
 
 #[test]
 fn both_meshes_are_drawn_and_a_drag_turns_them() {
-    let mut shown = part(Part::Meshes, 2);
+    let mut shown = part(ShapePart::Meshes, 2);
     shown.says("step 0, 8 facets").says("this step, 8 facets").says("axes of 3σ");
     let at = shown.harness.get_by_label("meshes in space").rect().center();
     shown.harness.drag_at(at);
@@ -116,17 +116,17 @@ fn both_meshes_are_drawn_and_a_drag_turns_them() {
 
 #[test]
 fn the_hand_off_gives_score_correction_and_share_and_elsewhere_says_where_it_is() {
-    let shown = part(Part::HandOff, HAND_OFF);
+    let shown = part(ShapePart::HandOff, HAND_OFF);
     shown.says("step 3, draped").says("step 4, where it was found");
     shown.says("0.913").says("2.40 px").says("82 %").says("1σ 0.20 and 0.10 px");
     shown.says("handed over from step 3");
-    part(Part::HandOff, 2).says("The hand-off is at step 4, where other cameras take over.");
+    part(ShapePart::HandOff, 2).says("The hand-off is at step 4, where other cameras take over.");
 }
 
 #[test]
 fn no_part_is_blank_without_a_sentence_that_says_why() {
     for tracker in [TrackerKind::Shape, TrackerKind::Combined] {
-        for part in Part::ALL.into_iter().filter(|part| *part != Part::HandOff) {
+        for part in ShapePart::ALL.into_iter().filter(|part| *part != ShapePart::HandOff) {
             let shown = Shown::pane(Pane::Shape, move |context| {
                 let mut state = shape_run::at_step(context, tracker, 1);
                 state.shape_view.part = part;
@@ -137,12 +137,12 @@ fn no_part_is_blank_without_a_sentence_that_says_why() {
             );
         }
     }
-    part(Part::Meshes, 0).says("later stops are registered to the surface at the designation");
-    part(Part::Surface, 0).says("disparity, px");
-    let refused = part(Part::Sensor, REFUSED);
+    part(ShapePart::Meshes, 0).says("later stops are registered to the surface at the designation");
+    part(ShapePart::Surface, 0).says("disparity, px");
+    let refused = part(ShapePart::Sensor, REFUSED);
     refused.says("Not used: the RMS residual of the surfaces is 2.6 times its predicted σ");
-    part(Part::Meshes, REFUSED).says("meshes in space");
-    for part in Part::ALL {
+    part(ShapePart::Meshes, REFUSED).says("meshes in space");
+    for part in ShapePart::ALL {
         let loading = with(part, HAND_OFF, |state| state.cache = crate::cache::Cache::default());
         loading.says("Loading step 4");
     }
@@ -152,17 +152,17 @@ fn no_part_is_blank_without_a_sentence_that_says_why() {
 
 #[test]
 fn the_parts_are_chosen_by_their_names() {
-    let mut shown = part(Part::Sensor, 2);
-    let chosen = Command::SetShapeView(ShapeView { part: Part::Meshes, ..ShapeView::default() });
+    let mut shown = part(ShapePart::Sensor, 2);
+    let chosen = Command::SetShapeView(ShapeView { part: ShapePart::Meshes, ..ShapeView::default() });
     assert_eq!(shown.click("Meshes"), vec![chosen]);
     let mut state = fixture::nothing();
-    state.perform(Command::SetShapeView(ShapeView { part: Part::HandOff, ..ShapeView::default() }));
-    assert_eq!(state.shape_view.part, Part::HandOff);
+    state.perform(Command::SetShapeView(ShapeView { part: ShapePart::HandOff, ..ShapeView::default() }));
+    assert_eq!(state.shape_view.part, ShapePart::HandOff);
 }
 
 #[test]
 fn a_prediction_that_may_lie_outside_the_basin_is_warned_of() {
-    part(Part::Sensor, 2);
+    part(ShapePart::Sensor, 2);
     let uncertain = Shown::new(
         [900.0, 700.0],
         |context| {

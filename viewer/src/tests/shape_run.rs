@@ -1,4 +1,4 @@
-//! The fixed drive with the target found by its shape: registered at step 2, refused at step 3, handed over at step 4.
+//! The fixed drive with the target located by its shape: registered at step 2, refused at step 3, handed off at step 4.
 
 use std::sync::Arc;
 
@@ -33,10 +33,10 @@ const SHIFTS: u32 = 9;
 pub(crate) const FACETS: usize = 8;
 /// The step at which the registration is refused.
 pub(crate) const REFUSED: usize = 3;
-/// The step at which other cameras take over.
+/// The step of the camera hand-off.
 pub(crate) const HAND_OFF: usize = 4;
 
-/// A session with one target and its run by a tracker that asks the shape, at `step`, with everything loaded.
+/// A session with one target and its run by a tracker that uses shape, at `step`, with all data loaded.
 pub(crate) fn at_step(context: &egui::Context, tracker: TrackerKind, step: usize) -> State {
     let mut state = fixture::at_step(context, step);
     let traces: Vec<RunStep> = (0..fixture::STOPS - 1).map(|step| trace(tracker, step)).collect();
@@ -47,7 +47,7 @@ pub(crate) fn at_step(context: &egui::Context, tracker: TrackerKind, step: usize
         run.summary = summarise(&traces);
     }
     if let Some(traverse) = &mut state.traverse {
-        // Other cameras have other images.
+        // The images of the hand-off cameras have another size.
         traverse.stops.iter_mut().skip(HAND_OFF).for_each(|stop| stop.left_size = [640, 480]);
     }
     let Some(trace) = traces.into_iter().nth(step) else { return state };
@@ -62,7 +62,7 @@ pub(crate) fn at_step(context: &egui::Context, tracker: TrackerKind, step: usize
         } else {
             Item::Raster(Arc::new(Raster::from_npy(context, name, &bytes).unwrap()))
         };
-        state.cache.arrived(Key::Array(key.clone(), name), Ok(item), 0.0);
+        state.cache.store(Key::Array(key.clone(), name), Ok(item), 0.0);
     }
     fixture::load(&mut state, trace);
     state

@@ -1,4 +1,4 @@
-//! Panels as tables: every value of the plot with its unit, the present step marked, copied as CSV, heard as a table.
+//! Panels as tables: every value of the plot with its unit, the current step marked, copied as CSV, accessible as a table.
 
 use egui::accesskit::Role;
 use egui_kittest::kittest::Queryable;
@@ -13,7 +13,7 @@ use crate::panels::pane::Pane;
 use crate::panels::sheets::of_panel as sheets;
 use crate::panels::sheets::{Cell, Sheet};
 use crate::state::State;
-use crate::tables::Kind;
+use crate::tables::MatchOutcome;
 use crate::tests::{Shown, feature_run, fixture, shape_run};
 
 fn table(pane: Pane, step: usize) -> Shown<'static> {
@@ -90,30 +90,31 @@ fn the_stereo_profile_as_a_table_marks_its_best_range() {
 }
 
 #[test]
-fn what_the_feature_tracker_saw_is_counted_and_listed() {
+fn the_feature_tables_match_the_evidence() {
     let mut state = feature_run::at_step(&egui::Context::default(), 2);
     let [residuals, draws, all] = sheets::of(&state, Pane::Features).unwrap().try_into().unwrap();
     let features = state.features().ready().unwrap().clone();
     let sum = |sheet: &Sheet, column: usize| -> f64 {
         sheet.rows.iter().map(|row| number(&row.cells[column])).sum()
     };
-    let of_kind = |kind: Kind| features.iter().filter(|feature| Kind::of(feature) == kind).count();
-    assert_eq!(sum(&residuals, 2), of_kind(Kind::Inlier) as f64);
-    assert_eq!(sum(&residuals, 3), of_kind(Kind::Outlier) as f64);
+    let of_kind =
+        |kind: MatchOutcome| features.iter().filter(|feature| MatchOutcome::of(feature) == kind).count();
+    assert_eq!(sum(&residuals, 2), of_kind(MatchOutcome::Inlier) as f64);
+    assert_eq!(sum(&residuals, 3), of_kind(MatchOutcome::Outlier) as f64);
     let motion = state.feature_evidence().unwrap().fit_motion.clone().unwrap();
     assert_eq!(draws.rows.len(), motion.consensus_by_draw.len());
     let best = draws.rows.iter().find(|row| row.is_present).unwrap();
     assert_eq!(number(&best.cells[1]), f64::from(*motion.consensus_by_draw.iter().max().unwrap()));
     assert_eq!(all.rows.len(), features.len());
     assert_eq!(all.rows[0].cells[0], Cell::Number(features[0].pixel.x));
-    // The table shows what the filters let through.
+    // The table contains the rows that pass the filters.
     state.feature_view.residual_m = [0.0, 0.0];
     let [.., fewer] = &sheets::of(&state, Pane::Features).unwrap()[..] else { panic!("three tables") };
     assert!(fewer.rows.len() < all.rows.len());
 }
 
 #[test]
-fn what_the_shape_tracker_saw_is_told_in_numbers() {
+fn the_shape_tables_match_the_evidence() {
     let state = shape_run::at_step(&egui::Context::default(), TrackerKind::Shape, 2);
     let [numbers, errors, coarse, way] = sheets::of(&state, Pane::Shape).unwrap().try_into().unwrap();
     let found = state.shape_evidence().unwrap().registration.clone().unwrap();
@@ -123,7 +124,7 @@ fn what_the_shape_tracker_saw_is_told_in_numbers() {
     let sum = |column: usize| -> f64 { errors.rows.iter().map(|row| number(&row.cells[column])).sum() };
     assert_eq!(sum(2), seen(ArrayName::ERROR_BEFORE) as f64);
     assert_eq!(sum(3), seen(ArrayName::ERROR_FINE) as f64);
-    // The best shift is where the registration says.
+    // The best shift is at the position that the registration reports.
     assert_eq!(coarse.rows.len(), seen(ArrayName::COARSE_SEARCH));
     let best = coarse.rows.iter().find(|row| row.is_present).unwrap();
     let least = coarse.rows.iter().map(|row| number(&row.cells[2])).fold(f64::INFINITY, f64::min);

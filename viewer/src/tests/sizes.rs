@@ -1,4 +1,4 @@
-//! What fits in a small window: the plots and the patches of every arrangement, and the words beside buttons.
+//! Layout of a small window: the plots and the patches of every preset, and the words beside buttons.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -17,7 +17,7 @@ use crate::tests::{Shown, fixture};
 /// Margin of the harness around the page, points.
 const MARGIN: f32 = 8.0;
 
-/// The panels of an arrangement in a window of this size, and the place of each panel.
+/// The panels of a preset in a window of this size, and the rectangle of each panel.
 fn page([width, height]: [f32; 2], preset: Preset) -> (Shown<'static>, Vec<(Pane, Rect)>) {
     let mut workspace = Workspace::default();
     workspace.apply(LayoutCommand::Use(preset));
@@ -38,12 +38,12 @@ fn page([width, height]: [f32; 2], preset: Preset) -> (Shown<'static>, Vec<(Pane
     (shown, places.take())
 }
 
-/// The place of a panel, if the arrangement has it in front.
+/// The rectangle of a panel, if the preset has it in front.
 fn place(places: &[(Pane, Rect)], pane: Pane) -> Option<Rect> {
     places.iter().find(|(other, _)| *other == pane).map(|(_, place)| *place)
 }
 
-/// The painted texts of a panel with their places.
+/// The painted texts of a panel with their rectangles.
 fn texts(shown: &Shown<'_>, panel: Rect) -> Vec<(String, Rect)> {
     let shapes = shown.harness.output().shapes.iter();
     let of_panel = shapes.filter(|clipped| panel.expand(1.0).contains_rect(clipped.clip_rect));
@@ -87,9 +87,9 @@ fn every_patch_of_the_strip_is_inside_its_panel() {
             let (shown, places) = page(window, preset);
             let Some(panel) = place(&places, Pane::Strip) else { continue };
             count += 1;
-            let pointed = shown.harness.get_by_label_contains("at the pointer").rect();
+            let hovered = shown.harness.get_by_label_contains("at the pointer").rect();
             let rects = names.iter().map(|name| shown.harness.get_by_label(name).rect());
-            let rects: Vec<Rect> = rects.chain([pointed]).collect();
+            let rects: Vec<Rect> = rects.chain([hovered]).collect();
             for (number, rect) in rects.iter().enumerate() {
                 let at = format!("{preset:?} in {window:?}: patch {number} at {rect:?}");
                 assert!(panel.contains_rect(*rect), "{at} leaves {panel:?}");

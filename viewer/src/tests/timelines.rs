@@ -1,19 +1,19 @@
-//! The timeline: what it says, what a click does, and that its shapes are bounded by the width and not by the steps.
+//! The timeline: its description, its clicks, and that the number of its shapes is bounded by the width, not the steps.
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
-use crate::breakpoints::Ask;
+use crate::breakpoints::BreakpointCommand;
 use crate::command::{Command, Go};
 use crate::panels::pane::Pane;
 use crate::panels::timeline;
 use crate::state::State;
-use crate::tests::ask::breakpoint;
+use crate::tests::breakpoints::breakpoint;
 use crate::tests::{Shown, fixture};
 
 const SIZE: [f32; 2] = [1400.0, 160.0];
 
-/// A drive of so many steps with five runs whose state changes every few steps, hits at every second one, and a loop.
+/// A drive of this many steps with five runs whose state changes every few steps, hits at every second step, and a loop.
 fn long(steps: usize, every: usize) -> State {
     let mut state = fixture::at_step(&egui::Context::default(), 2);
     let stops = &mut state.traverse.as_mut().unwrap().stops;
@@ -42,12 +42,12 @@ fn long(steps: usize, every: usize) -> State {
         })
         .collect();
     let every_second: Vec<usize> = (0..steps).step_by(2).collect();
-    state.ask.breakpoints = (0..4).map(|number| breakpoint(number, "step > 0", &every_second)).collect();
-    (state.ask.play.loop_in, state.ask.play.loop_out) = (Some(10), Some(steps / 2));
+    state.breakpoints.list = (0..4).map(|number| breakpoint(number, "step > 0", &every_second)).collect();
+    (state.breakpoints.play.loop_in, state.breakpoints.play.loop_out) = (Some(10), Some(steps / 2));
     state
 }
 
-/// How many shapes the timeline of a state paints.
+/// Number of shapes that the timeline of a state paints.
 fn shapes(state: State) -> usize {
     let mut harness = Harness::builder().with_size(SIZE).build_ui(move |ui| {
         timeline::show(ui, &state, &mut Vec::new());
@@ -58,7 +58,7 @@ fn shapes(state: State) -> usize {
 
 #[test]
 fn ten_thousand_steps_need_no_more_shapes_than_the_width_allows() {
-    // The most that a column can need: its neighbours show something else, in every run.
+    // The maximum that a column can need: its neighbours differ from it in every run.
     let busiest = |steps: usize| shapes(long(steps, steps.div_ceil(661)));
     let [short, drive, longest] = [1_000, 10_000, 40_000].map(busiest);
     println!("shapes: {short} for 1,000 steps, {drive} for 10,000, {longest} for 40,000");
@@ -77,7 +77,7 @@ fn shown(state: impl FnOnce(&egui::Context) -> State + 'static) -> Shown<'static
 fn the_timeline_says_where_the_cursor_is_and_how_the_run_went() {
     let shown = shown(|context| {
         let mut state = fixture::at_step(context, 3);
-        state.ask.breakpoints = vec![breakpoint(0, "ncc < 0.6", &[3, 4])];
+        state.breakpoints.list = vec![breakpoint(0, "ncc < 0.6", &[3, 4])];
         state
     });
     shown.says("timeline: step 3 of 5, lost; run A: tracking 0 to 2, lost 3 to 3, failed 4 to 4, not computed yet 5 to 5");
@@ -102,10 +102,10 @@ fn a_click_on_the_band_goes_to_its_step_and_one_in_the_lane_breaks_there() {
             shown.harness.run_steps(1);
         }
         shown.harness.run_steps(1);
-        shown.asked()
+        shown.take_commands()
     };
     assert!(click(at(4.0, 25.0)).contains(&Command::Go(Go::Step(4))));
-    assert_eq!(click(at(1.0, 8.0)), [Command::Ask(Ask::BreakAt(1))]);
+    assert_eq!(click(at(1.0, 8.0)), [Command::Breakpoints(BreakpointCommand::BreakAt(1))]);
 }
 
 #[test]
@@ -122,7 +122,7 @@ fn every_run_of_the_target_has_a_band_and_other_targets_have_one_when_they_are_a
     other.number = 1;
     targets.push(other);
     let before = timeline::height(&many);
-    many.perform(Command::Ask(Ask::ShowOthers(true)));
+    many.perform(Command::Breakpoints(BreakpointCommand::ShowOthers(true)));
     assert!(timeline::height(&many) > before);
     let target = &mut many.session.as_mut().unwrap().targets[0];
     let run = target.runs[0].clone();
@@ -145,7 +145,7 @@ fn ten_thousand_steps_cost_every_panel_hardly_more_than_a_thousand() {
     for pane in Pane::ALL {
         let [short, longer] = [1_000, 10_000].map(|steps| vertices(pane, steps));
         println!("{pane:?}: {short} vertices for 1,000 steps, {longer} for 10,000");
-        // A curve of a thousand steps is drawn whole, a longer one by four points in each of 600 columns.
+        // A curve of a thousand steps is drawn completely, a longer one with four points in each of 600 columns.
         assert!(longer < 3 * short + 20_000, "{pane:?}: {longer} for 10,000 steps, {short} for 1,000");
         assert!(longer < 250_000, "{pane:?}: {longer}");
     }

@@ -9,7 +9,7 @@ use crate::panels::pane::Pane;
 use crate::state::State;
 use crate::tests::{Shown, fixture};
 
-/// The fixed drive at step 3, where criterion 3 fires besides criterion 1.
+/// The fixed drive at step 3, where gate 3 fails in addition to gate 1.
 fn fires_at_three(context: &egui::Context) -> State {
     let mut state = fixture::at_step(context, 3);
     let session = state.session.as_mut().unwrap();
@@ -39,7 +39,7 @@ fn a_preset_becomes_the_changes_that_lead_from_the_run_to_it() {
     let mut state = fixture::at_step(&egui::Context::default(), 2);
     state.perform(Command::UsePreset("half-pixel"));
     assert_eq!(state.draft, [("noise_model".to_owned(), json!("half_pixel"))].into());
-    // From another run the way back to the defaults is the opposite change.
+    // From another run, the change back to the defaults is the opposite one.
     let settings = state.pending().unwrap();
     state.session.as_mut().unwrap().targets[0].runs[0].settings = settings;
     state.perform(Command::UsePreset("sightline"));

@@ -1,8 +1,8 @@
-//! How everything looks: colours (`palette`), text styles and spacing. The only place with colour literals.
+//! The visual design: colours (`palette`), text styles and spacing. The only module with colour literals.
 //!
-//! Data colours are those of Okabe and Ito, which people with any common colour vision tell apart; each meaning
-//! has a shape and a word besides. Scores are viridis with fixed limits, signed errors blue–white–red about zero,
-//! and a value that does not exist is a checker, never a colour.
+//! Data colours are those of Okabe and Ito, which are distinguishable with any common colour vision; each meaning also has
+//! a shape and a word. Scores use viridis with fixed limits, signed errors blue–white–red about zero, and missing values a
+//! checker.
 
 use egui::{
     Color32, CornerRadius, FontDefinitions, FontFamily, FontId, Margin, RichText, Stroke, TextStyle, Theme,
@@ -15,37 +15,37 @@ mod palette;
 
 pub(crate) use self::palette::*;
 
-/// A match that agrees with the motion: a dot and solid lines.
+/// Inliers: a dot and solid lines.
 pub(crate) fn inlier() -> Color32 {
     tracking()
 }
 
-/// A match that does not: a cross and dashed lines.
+/// Outliers: a cross and dashed lines.
 pub(crate) fn outlier() -> Color32 {
     failed()
 }
 
-/// The surface of an earlier step: lines.
+/// The mesh of an earlier step: lines.
 pub(crate) fn mesh_earlier() -> Color32 {
     lost()
 }
 
-/// The surface of the step: filled and shaded.
+/// The mesh of the current step: filled and shaded.
 pub(crate) fn mesh_present() -> Color32 {
     prediction()
 }
 
-/// How far from the prediction a registration by shape can start.
+/// The basin within which a registration by shape converges.
 pub(crate) fn basin() -> Color32 {
     search()
 }
 
-/// What is only tried: dashed.
+/// Results of tried changes: dashed.
 pub(crate) fn ghost() -> Color32 {
     accent()
 }
 
-/// The tint of the step before, where it shines through.
+/// The tint of the previous step's image when it is overlaid.
 pub(crate) const ONION: Color32 = Color32::from_rgba_premultiplied(0x80, 0x80, 0x80, 0x80);
 /// A texture in its own colours.
 pub(crate) const UNTINTED: Color32 = Color32::WHITE;
@@ -63,34 +63,35 @@ pub(crate) fn state(state: TrackingState) -> Color32 {
     }
 }
 
-/// The colour of met and unmet.
+/// The colour of passed and failed gates.
 pub(crate) fn verdict(good: bool) -> Color32 {
     if good { tracking() } else { failed() }
 }
 
-/// The colour of a breakpoint's hits; its shape is another one where the colours repeat.
+/// The colour of a breakpoint's hits; breakpoints with the same colour differ in shape.
 pub(crate) fn breakpoint(number: usize) -> Color32 {
     [failed(), run(1), search(), prediction()][number % 4]
 }
 
-/// A colour between a fifth and all of its brightness.
+/// A colour scaled in brightness, from a fifth at `share` 0 to the full colour at 1.
 pub(crate) fn shaded(colour: Color32, share: f64) -> Color32 {
     let bright = 0.2 + 0.8 * share.clamp(0.0, 1.0);
     let level = |value: u8| (f64::from(value) * bright).round() as u8;
     Color32::from_rgb(level(colour.r()), level(colour.g()), level(colour.b()))
 }
 
-/// Viridis, from 0 for the least score that is shown to 1 for the greatest; transparent where there is none.
+/// Viridis, from 0 for the smallest score shown to 1 for the largest; transparent for NaN.
 pub(crate) fn score(share: f32) -> Color32 {
     ramp(colorous::VIRIDIS, f64::from(share))
 }
 
-/// Blue–white–red over signed values from −`limit` to `limit`.
+/// Blue–white–red from −`limit` to `limit`; transparent for NaN.
 pub(crate) fn signed(value: f32, limit: f32) -> Color32 {
     ramp(colorous::RED_BLUE, 0.5 - f64::from(value / limit) / 2.0)
 }
 
-/// Red–yellow–green over the goodness of the ground, 0 to 100, half transparent; unknown ground has no colour.
+/// Red–yellow–green over the goodness of the ground, 0 to 100 %, semi-transparent; unknown ground (negative) is
+/// transparent.
 pub(crate) fn goodness(percent: i8) -> Color32 {
     if percent < 0 {
         return Color32::TRANSPARENT;
@@ -98,7 +99,7 @@ pub(crate) fn goodness(percent: i8) -> Color32 {
     ramp(colorous::RED_YELLOW_GREEN, f64::from(percent) / 100.0).gamma_multiply(0.6)
 }
 
-/// How well a target would do.
+/// The colour of a trackability verdict.
 pub(crate) fn trackability(verdict: Verdict) -> Color32 {
     match verdict {
         Verdict::Good => tracking(),
@@ -107,7 +108,7 @@ pub(crate) fn trackability(verdict: Verdict) -> Color32 {
     }
 }
 
-/// What is laid over an image: a tint of good places, 12 % less light on poor ones; `None` for risky places, which are outlined.
+/// The overlay on an image: a tint for good places, 12 % darker for bad ones; `None` for risky places, which are outlined.
 pub(crate) fn trackability_fill(verdict: Verdict) -> Option<Color32> {
     match verdict {
         Verdict::Good => Some(trackability(verdict).gamma_multiply(0.2)),
@@ -116,7 +117,7 @@ pub(crate) fn trackability_fill(verdict: Verdict) -> Option<Color32> {
     }
 }
 
-/// Grey from black (0) to white (1); transparent where there is no value.
+/// Grey from black (0) to white (1); transparent for NaN.
 pub(crate) fn grey(value: f32) -> Color32 {
     if value.is_nan() {
         Color32::TRANSPARENT
@@ -133,11 +134,11 @@ fn ramp(gradient: colorous::Gradient, t: f64) -> Color32 {
     Color32::from_rgb(c.r, c.g, c.b)
 }
 
-/// Gives the context its looks.
-pub(crate) fn apply(context: &egui::Context, looks: Looks) {
-    palette::choose(looks);
+/// Applies fonts, colours and spacing to the context.
+pub(crate) fn apply(context: &egui::Context, colour_theme: ColourTheme) {
+    palette::choose(colour_theme);
     let mut fonts = FontDefinitions::default();
-    // Arrows and dots, which the proportional font lacks, come from the one with equal widths.
+    // Arrows and dots, which the proportional font lacks, are taken from the monospace font.
     let fallback = fonts.families.get(&FontFamily::Monospace).cloned().unwrap_or_default();
     let proportional = fonts.families.entry(FontFamily::Proportional).or_default();
     for font in fallback {
@@ -146,7 +147,7 @@ pub(crate) fn apply(context: &egui::Context, looks: Looks) {
         }
     }
     context.set_fonts(fonts);
-    context.set_theme(if looks == Looks::Light { Theme::Light } else { Theme::Dark });
+    context.set_theme(if colour_theme == ColourTheme::Light { Theme::Light } else { Theme::Dark });
     context.all_styles_mut(|style| {
         style.text_styles = [
             (TextStyle::Heading, FontId::new(17.0, FontFamily::Proportional)),
@@ -169,7 +170,7 @@ pub(crate) fn apply(context: &egui::Context, looks: Looks) {
 }
 
 fn visuals() -> Visuals {
-    let mut visuals = if looks() == Looks::Light { Visuals::light() } else { Visuals::dark() };
+    let mut visuals = if colour_theme() == ColourTheme::Light { Visuals::light() } else { Visuals::dark() };
     visuals.panel_fill = panel();
     visuals.window_fill = bar();
     visuals.window_stroke = Stroke::new(1.0, line());
@@ -203,12 +204,12 @@ fn visuals() -> Visuals {
     visuals
 }
 
-/// A panel's title: small capitals, widely set.
+/// A panel's title: small capitals with wide spacing.
 pub(crate) fn title(text: &str) -> RichText {
     RichText::new(text.to_uppercase()).size(10.5).extra_letter_spacing(1.1).color(weak())
 }
 
-/// A formula in signs that the fonts have: no raised T, and no bar over letters.
+/// A formula in characters that the fonts contain: no superscript T, and no bar over letters.
 pub(crate) fn formula(text: &str) -> String {
     text.replace('ᵀ', "^T").replace("T\u{304}", "mean T").replace('Ī', "mean I")
 }
@@ -218,7 +219,7 @@ pub(crate) fn label(text: impl Into<String>) -> RichText {
     RichText::new(text).color(weak())
 }
 
-/// A value with digits of equal width.
+/// A value in monospace digits.
 pub(crate) fn number(text: impl Into<String>) -> RichText {
     RichText::new(text).monospace().color(strong())
 }
@@ -228,7 +229,7 @@ pub(crate) fn note(text: impl Into<String>) -> RichText {
     RichText::new(text).small().color(weak())
 }
 
-/// The font of words painted on images.
+/// The font of text painted on images.
 pub(crate) fn image_font() -> FontId {
     FontId::new(11.0, FontFamily::Proportional)
 }
@@ -251,14 +252,14 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_exist_has_no_colour() {
+    fn nan_is_transparent() {
         assert_eq!(score(f32::NAN), Color32::TRANSPARENT);
         assert_eq!(signed(f32::NAN, 1.0), Color32::TRANSPARENT);
         assert_eq!(grey(f32::NAN), Color32::TRANSPARENT);
     }
 
     #[test]
-    fn the_score_scale_is_fixed_from_minus_one_to_one() {
+    fn score_colours_saturate_outside_zero_to_one() {
         assert_eq!(score(-1.0), score(-7.0));
         assert_eq!(score(1.0), score(7.0));
         assert_ne!(score(0.0), score(0.5));

@@ -1,4 +1,4 @@
-//! The bubble of the tour, beside the place that it points at.
+//! The bubble of the tour, placed beside its anchor.
 
 use egui::{Area, Frame, Id, Margin, Order, Pos2, Rect, Stroke, StrokeKind, Ui, Vec2, pos2, vec2};
 
@@ -10,15 +10,15 @@ use crate::tour::{Bubble, Turn, place};
 
 /// Width of a bubble, points.
 const WIDTH: f32 = 320.0;
-/// What a bubble takes at most, points; only its place is computed from it.
+/// Maximum size of a bubble, points; used only to place it.
 const SIZE: Vec2 = vec2(WIDTH + 28.0, 190.0);
-/// Distance between a bubble and what it points at, points.
+/// Distance between a bubble and its anchor, points.
 const GAP: f32 = 10.0;
 
 /// Shows the open bubble, if one is open.
 pub(crate) fn show(ui: &Ui, state: &State, out: &mut Vec<Command>) {
     let (Some(at), Some(bubble)) = (state.tour.at, state.tour.bubble()) else { return };
-    // A dialog is in front; the bubble is there again once it is closed.
+    // A dialog is in front; the bubble reappears once it is closed.
     if state.files.is_open || state.exports.is_open {
         return;
     }
@@ -44,7 +44,7 @@ pub(crate) fn show(ui: &Ui, state: &State, out: &mut Vec<Command>) {
     );
 }
 
-/// Whether a place shows something: a panel may say only what it lacks.
+/// Whether an anchor has content: an empty panel shows only what it lacks.
 fn has_content(state: &State, name: &str) -> bool {
     let pane = Pane::ALL.into_iter().find(|pane| pane.title() == name);
     pane.is_none_or(|pane| pane.panel().missing(state).is_none())
@@ -76,7 +76,8 @@ fn contents(ui: &mut Ui, at: usize, bubble: Bubble, state: &State, out: &mut Vec
     });
 }
 
-/// Where the bubble stands: above, below or beside its place, where there is room; else in the middle of the screen.
+/// The bubble's corner: above, below or beside the anchor, where there is room; otherwise the bubble is centred on the
+/// screen.
 fn corner(anchor: Option<Rect>, screen: Rect) -> Pos2 {
     let middle = screen.center() - SIZE / 2.0;
     let Some(anchor) = anchor else { return middle };

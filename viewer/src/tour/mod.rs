@@ -1,7 +1,7 @@
 //! The tour: six bubbles that lead a new user from a lost target to a saved one. It never blocks the page.
 //!
-//! A bubble points at a place by its name; panels and bars say in every frame where they are ([`here`]). Where the place is not
-//! on the screen, the bubble stands in the middle, and its sentence still says what to look for.
+//! A bubble points at an anchor, which has a name; panels and bars report their rectangles in every frame ([`here`]). If
+//! the anchor is not on the screen, the bubble is centred and its sentence describes where to find it.
 
 pub(crate) mod bubbles;
 pub(crate) mod update;
@@ -9,41 +9,41 @@ mod words;
 
 use egui::{Context, Id, Rect};
 
-/// Under which name the browser remembers that the tour was seen.
+/// Storage key that records that the user has seen the tour.
 #[cfg(target_arch = "wasm32")]
 const SEEN: &str = "sightline.tour";
 
-/// What the place of the timeline is called.
+/// Anchor name of the timeline.
 pub(crate) const TIMELINE: &str = "timeline";
-/// What the place of the top bar is called.
+/// Anchor name of the top bar.
 pub(crate) const TOP: &str = "top bar";
 
-/// What a person asks of the tour.
+/// A command about the tour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Turn {
-    /// From the first bubble on.
+    /// Starts at the first bubble.
     Begin,
-    /// The next bubble; after the last it ends.
+    /// Shows the next bubble; after the last one, ends the tour.
     Next,
-    /// The bubble before.
+    /// Shows the previous bubble.
     Back,
-    /// Ends it.
+    /// Ends the tour.
     End,
 }
 
-/// Where the tour is.
+/// State of the tour.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tour {
-    /// The bubble that is open, from 0.
+    /// Index of the open bubble, from 0.
     pub at: Option<usize>,
-    /// Whether it was seen or skipped before.
+    /// Whether the user has seen or skipped the tour before.
     pub is_seen: bool,
-    /// Whether the loss of the first drive was shown without the tour, or the cursor was elsewhere.
+    /// Whether the loss on the first drive was shown without the tour, or the cursor was elsewhere.
     pub has_shown_loss: bool,
 }
 
 impl Tour {
-    /// Goes on as asked.
+    /// Carries out a command.
     pub fn turn(&mut self, turn: Turn) {
         self.at = match (turn, self.at) {
             (Turn::Begin, _) => Some(0),
@@ -54,13 +54,13 @@ impl Tour {
         self.is_seen |= self.at.is_none();
     }
 
-    /// The open bubble.
+    /// The open bubble; `None` while the tour is closed.
     pub fn bubble(&self) -> Option<Bubble> {
         self.at.and_then(|at| Bubble::ALL.get(at)).copied()
     }
 }
 
-/// The bubbles in their order.
+/// The bubbles, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bubble {
     /// Step along the drive.
@@ -69,19 +69,19 @@ pub enum Bubble {
     Lost,
     /// Why it was lost.
     Why,
-    /// What would have saved it.
+    /// The counterfactuals of the loss.
     WhatIf,
     /// Compare the two runs.
     Compare,
-    /// Share what was found.
+    /// Share the findings.
     Share,
 }
 
 impl Bubble {
-    /// All of them.
+    /// All bubbles, in order.
     pub const ALL: [Self; 6] = [Self::Step, Self::Lost, Self::Why, Self::WhatIf, Self::Compare, Self::Share];
 
-    /// Its title.
+    /// The title of the bubble.
     pub const fn title(self) -> &'static str {
         match self {
             Self::Step => "Step",
@@ -93,7 +93,7 @@ impl Bubble {
         }
     }
 
-    /// The places it points at, the best first.
+    /// The anchors of the bubble, best first.
     pub const fn anchors(self) -> &'static [&'static str] {
         match self {
             Self::Step | Self::Lost => &[TIMELINE],
@@ -105,27 +105,28 @@ impl Bubble {
     }
 }
 
-/// Whether the tour was seen on an earlier visit; outside a browser nothing remembers it, and it waits to be asked for.
+/// Whether the tour was seen on an earlier visit. Outside a browser this is not stored, and the tour does not start by
+/// itself.
 pub(crate) fn was_seen() -> bool {
     #[cfg(target_arch = "wasm32")]
-    return crate::page::web::kept(SEEN).is_some();
+    return crate::page::web::stored_item(SEEN).is_some();
     #[cfg(not(target_arch = "wasm32"))]
     true
 }
 
-/// Remembers that the tour was seen.
+/// Stores that the tour was seen.
 pub(crate) fn remember_seen() {
     #[cfg(target_arch = "wasm32")]
-    crate::page::web::keep(SEEN, "yes");
+    crate::page::web::store_item(SEEN, "yes");
 }
 
-/// A place says where it is in this frame.
+/// Reports the rectangle of an anchor in this frame.
 pub(crate) fn here(context: &Context, name: &str, rect: Rect) {
     let frame = context.cumulative_pass_nr();
     context.data_mut(|data| data.insert_temp(id(name), (frame, rect)));
 }
 
-/// Where a place is, if it was on the screen in this frame or the one before.
+/// The rectangle of an anchor, if it was on the screen in this frame or the previous one.
 pub(crate) fn place(context: &Context, name: &str) -> Option<Rect> {
     let (frame, rect) = context.data(|data| data.get_temp::<(u64, Rect)>(id(name)))?;
     (context.cumulative_pass_nr() <= frame + 1).then_some(rect)

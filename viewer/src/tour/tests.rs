@@ -1,4 +1,4 @@
-//! The tour: walked and skipped by keyboard and by buttons, right about what is there, and never begun twice by itself.
+//! The tour: used by keyboard and by buttons, skipped, consistent with the state, and started only once by itself.
 
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable;
@@ -7,8 +7,8 @@ use sightline_world::library;
 use crate::command::help;
 use crate::command::keys;
 use crate::command::{Command, Go, Mode};
+use crate::hovered::Hovered;
 use crate::panels::pane::Pane;
-use crate::pointed::Pointed;
 use crate::state::State;
 use crate::state::effect::Effect;
 use crate::tests::{Shown, fixture};
@@ -58,7 +58,7 @@ fn the_tour_is_walked_and_skipped_by_keyboard() {
     }
     assert_eq!(state.tour.bubble(), Some(Bubble::Share));
     assert_eq!(press(&mut state, Key::Enter), None);
-    // Without a tour Enter means nothing, and the drive can be stepped while one is open.
+    // Without a tour Enter has no effect, and while one is open the user can step along the drive.
     assert_eq!(keys::command(Key::Enter, Modifiers::NONE, &state), None);
     state.perform(Command::Tour(Turn::Begin));
     assert!(matches!(keys::command(Key::ArrowRight, Modifiers::NONE, &state), Some(Command::Go(_))));
@@ -111,22 +111,22 @@ fn the_tour_does_what_it_speaks_of() {
 
 #[test]
 fn the_pointer_on_a_bubble_points_at_nothing_below_it() {
-    let pointed = std::rc::Rc::new(std::cell::Cell::new(None));
-    let kept = std::rc::Rc::clone(&pointed);
-    // Below the bubble everything points at a step, as the timeline and the map do.
+    let hovered = std::rc::Rc::new(std::cell::Cell::new(None));
+    let kept = std::rc::Rc::clone(&hovered);
+    // Everything below the bubble hovers a step, as the timeline and the map do.
     let mut shown = Shown::new([1280.0, 720.0], touring(2), move |ui, state, out| {
         crate::layout::show_pane(ui, Pane::Map, state, out);
         bubbles::show(ui, state, out);
-        out.push(Command::Point(Pointed::Step(4)));
-        kept.set(crate::state::pointed::taken(ui.ctx(), out));
+        out.push(Command::Hover(Hovered::Step(4)));
+        kept.set(crate::state::hovered::take_hovered(ui.ctx(), out));
     });
     let next = shown.harness.get_by_label("Next").rect().center();
     let mut at = |place| {
         shown.harness.hover_at(place);
         shown.harness.run_steps(3);
-        pointed.get()
+        hovered.get()
     };
-    assert_eq!(at(egui::pos2(5.0, 5.0)), Some(Pointed::Step(4)));
+    assert_eq!(at(egui::pos2(5.0, 5.0)), Some(Hovered::Step(4)));
     assert_eq!(at(next), None);
 }
 
@@ -158,7 +158,7 @@ fn it_begins_by_itself_on_the_first_drive_alone_and_only_once() {
     state.perform(Command::Tour(Turn::End));
     state.take_requests();
     assert_eq!(state.tour.at, None);
-    // Before the target is there, the tour would speak of what cannot be seen.
+    // Before the target is loaded, the tour would describe content that is not visible.
     let mut early = fixture::without_target();
     if let Some(traverse) = &mut early.traverse {
         traverse.name = library::FIRST_NAME.to_owned();

@@ -1,4 +1,4 @@
-//! The tour: begun by itself on the first drive, where it was never seen; and what the keys ask of it.
+//! The tour: its start on the first drive if the user has not seen it, its actions, and its keys.
 
 use egui::Key;
 use sightline_world::library;
@@ -6,10 +6,10 @@ use sightline_world::library;
 use crate::command::{Command, Go, Mode};
 use crate::state::{State, events};
 use crate::tour::{Bubble, Turn};
-use crate::why::Ask;
+use crate::why::WhyCommand;
 
 impl State {
-    /// Goes on in the tour as asked.
+    /// Carries out a command of the tour and the action of its bubble.
     pub(crate) fn turn_tour(&mut self, turn: Turn) {
         self.tour.turn(turn);
         if turn != Turn::End {
@@ -17,17 +17,17 @@ impl State {
         }
     }
 
-    /// Does what the open bubble speaks of, so that it can be seen.
+    /// Performs the action that the open bubble explains.
     fn do_bubble(&mut self) {
         let Some(bubble) = self.tour.bubble() else { return };
         if let Some(step) = self.lost_step().filter(|_| bubble != Bubble::Share) {
-            // The first bubble begins just before the loss, the others at it.
+            // The first bubble starts just before the loss, the others at it.
             let step = if bubble == Bubble::Step { step.saturating_sub(1) } else { step };
             self.perform(Command::Go(Go::Step(step)));
         }
         match bubble {
-            Bubble::Why if self.row().is_some() => self.perform(Command::Why(Ask::Selected)),
-            Bubble::WhatIf if self.row().is_some() => self.perform(Command::Why(Ask::Saved)),
+            Bubble::Why if self.row().is_some() => self.perform(Command::Why(WhyCommand::Selected)),
+            Bubble::WhatIf if self.row().is_some() => self.perform(Command::Why(WhyCommand::Saved)),
             _ => {}
         }
     }
@@ -38,7 +38,7 @@ impl State {
         events(self.run()?).into_iter().find(is_lost)
     }
 
-    /// Begins the tour on the first drive as soon as its target is there. If it was seen before, the cursor goes to the loss
+    /// Starts the tour on the first drive once its target is loaded. If it was seen before, the cursor goes to the loss
     /// once, unless a link or an earlier visit put it elsewhere.
     pub(crate) fn sync_tour(&mut self) {
         let is_first = self.traverse.as_ref().is_some_and(|open| open.name == library::FIRST_NAME);
@@ -58,7 +58,7 @@ impl State {
     }
 }
 
-/// What a key asks of the open tour; keys that mean something else to a panel with the focus are left to it.
+/// The tour command of a key while the tour is open.
 pub(crate) fn of_key(key: Key, state: &State) -> Option<Turn> {
     if state.tour.at.is_none() || state.mode != Mode::Look {
         return None;

@@ -1,11 +1,11 @@
-//! What the bubbles of the tour say of what is there.
+//! The texts of the tour's bubbles.
 
 use crate::panels::numbers::counted;
 use crate::state::State;
 use crate::tour::Bubble;
 
 impl Bubble {
-    /// What it says of what is there.
+    /// The text of the bubble in this state.
     pub fn words(self, state: &State) -> String {
         match self {
             Self::Step => format!(
@@ -31,7 +31,7 @@ impl Bubble {
     }
 }
 
-/// Where the target is lost, as far as that is known.
+/// Where the target is lost, if known so far.
 fn lost_words(state: &State) -> String {
     match (state.lost_step(), state.run_progress(), state.target()) {
         (Some(step), ..) => {

@@ -1,4 +1,4 @@
-//! The limits of trackability as a person types them: kept as text until they are used, so that nothing typed is lost.
+//! The form for the limits of trackability. It keeps the text of every field until the limits are applied.
 
 use std::collections::BTreeMap;
 
@@ -6,37 +6,37 @@ use serde_json::Value;
 use sightline_rover::trackability::TrackabilityLimits;
 use sightline_track::settings::Changes;
 
-/// What a person asks of the limits.
+/// A command about the limits.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Ask {
-    /// Opens their window.
+pub enum LimitsCommand {
+    /// Opens the window of the limits.
     Open,
-    /// Closes it; what was typed and not used is given up.
+    /// Closes the window and discards unapplied text.
     Close,
-    /// Types a limit.
+    /// Changes the text of a limit's field.
     Type {
-        /// Its name.
+        /// Name of the limit.
         key: String,
-        /// What stands in its field.
+        /// The text.
         text: String,
     },
-    /// Makes the map by what was typed.
+    /// Applies the limits and recomputes the map.
     Use,
-    /// Puts the defaults into the fields.
+    /// Resets the fields to the defaults.
     Defaults,
 }
 
-/// The limits as they are typed.
+/// The form of the limits.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Form {
-    /// What stands in the fields, by name.
+pub struct LimitsForm {
+    /// The text of each field, by name of the limit.
     pub texts: BTreeMap<String, String>,
-    /// Why it cannot be used, as one sentence.
+    /// Why the limits cannot be applied, as one sentence.
     pub refused: Option<String>,
 }
 
-impl Form {
-    /// The fields of these limits.
+impl LimitsForm {
+    /// The form for these limits.
     pub(super) fn of(limits: &Changes) -> Self {
         let text = |info: sightline_track::limits::SettingInfo| {
             let value = limits.get(&info.key).unwrap_or(&info.default).to_string();

@@ -1,4 +1,4 @@
-//! The window of the limits of trackability: every limit with its unit, its default and what it does.
+//! The window of the limits of trackability: every limit with its unit, its default and its effect.
 
 use egui::{Grid, Id, Label, Modal, RichText, ScrollArea, TextEdit, Ui};
 use sightline_rover::trackability::TrackabilityLimits;
@@ -7,7 +7,7 @@ use sightline_track::limits::{Domain, SettingInfo};
 use crate::command::Command;
 use crate::state::State;
 use crate::theme;
-use crate::trackability::limits::{Ask, Form};
+use crate::trackability::limits::{LimitsCommand, LimitsForm};
 
 /// Shows the window, while it is open.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
@@ -34,9 +34,9 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             ui.add(Label::new(RichText::new(sentence).color(theme::lost())).wrap());
         }
         ui.horizontal(|ui| {
-            for (words, ask) in [("Apply", Ask::Use), ("Reset", Ask::Defaults)] {
+            for (words, command) in [("Apply", LimitsCommand::Use), ("Reset", LimitsCommand::Defaults)] {
                 if ui.button(words).clicked() {
-                    out.push(Command::Limits(ask));
+                    out.push(Command::Limits(command));
                 }
             }
             ui.button("Close").clicked()
@@ -44,11 +44,11 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         .inner
     });
     if modal.inner || modal.should_close() {
-        out.push(Command::Limits(Ask::Close));
+        out.push(Command::Limits(LimitsCommand::Close));
     }
 }
 
-fn field(ui: &mut Ui, form: &Form, info: &SettingInfo, out: &mut Vec<Command>) {
+fn field(ui: &mut Ui, form: &LimitsForm, info: &SettingInfo, out: &mut Vec<Command>) {
     let mut text = form.texts.get(&info.key).cloned().unwrap_or_default();
     let default = info.default.to_string();
     let is_changed = text.trim() != default;
@@ -61,7 +61,7 @@ fn field(ui: &mut Ui, form: &Form, info: &SettingInfo, out: &mut Vec<Command>) {
     ui.label(RichText::new(&info.key).size(12.0).color(colour)).on_hover_text(help);
     let field = ui.add_sized([80.0, 22.0], TextEdit::singleline(&mut text)).accessible_name(&info.key);
     if field.changed() {
-        out.push(Command::Limits(Ask::Type { key: info.key.clone(), text }));
+        out.push(Command::Limits(LimitsCommand::Type { key: info.key.clone(), text }));
     }
     ui.label(theme::note(&info.unit));
     ui.label(theme::note(format!("default {default}")));

@@ -1,6 +1,6 @@
 //! The trackability of the cursor's stop, and the aim in its left image.
 //!
-//! The map is read while a target is picked, and again after each event about new rows; ending the pick cancels it.
+//! The map is read while a target is being picked, and again after each event about new rows; leaving the mode cancels it.
 
 pub(crate) mod limits;
 pub(crate) mod limits_window;
@@ -10,27 +10,27 @@ use sightline_geometry::frames::Pixel;
 use sightline_rover::trackability::MapProgress;
 use sightline_track::settings::Changes;
 
-use crate::state::Place;
-use crate::trackability::limits::Form;
+use crate::state::ImagePosition;
+use crate::trackability::limits::LimitsForm;
 
-/// A map of trackability: the traverse, the stop, and the limits that are not the defaults.
+/// Key of a trackability map: the traverse, the stop, and the limits that differ from the defaults.
 pub(crate) type MapPlace = (String, usize, Changes);
 
-/// The trackability of a stop.
+/// State of the trackability map.
 #[derive(Clone, Debug, Default)]
 pub struct Trackability {
-    /// The map that is shown or being made.
+    /// The map that is shown or being computed.
     pub place: Option<MapPlace>,
-    /// The limits that are not the defaults.
+    /// The limits that differ from the defaults.
     pub limits: Changes,
-    /// The limits as they are typed, while their window is open.
-    pub form: Option<Form>,
-    /// How far the map is; none before the first answer.
+    /// The form of the limits, while its window is open.
+    pub form: Option<LimitsForm>,
+    /// The progress of the map; `None` before the first reply.
     pub progress: Option<MapProgress>,
-    /// The place that was picked and is designated once the map judges it.
-    pub judged: Option<Place>,
-    /// The place chosen by keys.
+    /// The picked position, which is designated once the map has a verdict for it.
+    pub judged: Option<ImagePosition>,
+    /// The position aimed at by keys.
     pub aim: Option<Pixel>,
-    is_asked: bool,
+    is_pending: bool,
     is_stale: bool,
 }

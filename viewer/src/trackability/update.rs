@@ -1,4 +1,4 @@
-//! Reads the trackability of the cursor's stop, and moves the aim in its left image.
+//! Reads the trackability map of the cursor's stop, and moves the aim in its left image.
 
 use sightline_api::endpoint::{Call, Endpoint, NoBody};
 use sightline_api::endpoints::{CancelTrackability, ShowTrackability};
@@ -13,17 +13,17 @@ use sightline_track::settings::Changes;
 use crate::command::{Command, Mode};
 use crate::drawing::view2d::View2d;
 use crate::picking::aim::Aim;
-use crate::state::{Place, Refusal, State};
-use crate::trackability::limits::{Ask, Form};
+use crate::state::{ImagePosition, Refusal, State};
+use crate::trackability::limits::{LimitsCommand, LimitsForm};
 use crate::trackability::{MapPlace, Trackability};
 
 impl State {
-    /// The map of the cursor's stop, as far as it is computed.
+    /// The map of the cursor's stop, as far as it is computed; `None` for further cameras.
     pub fn trackability_map(&self) -> Option<&TrackabilityMap> {
         let (traverse, step, _) = self.trackability.place.as_ref()?;
         let is_here =
             self.traverse.as_ref().is_some_and(|open| open.id == *traverse) && *step == self.cursor.step;
-        // The map of a stop is that of its main pair.
+        // Only the main pair of a stop has a map.
         self.trackability.progress.as_ref().filter(|_| is_here && self.camera().is_none())?.map.as_ref()
     }
 
@@ -56,24 +56,24 @@ impl State {
             Aim::TakeNearest => {
                 if let Some(pixel) = nearest {
                     self.trackability.aim = None;
-                    self.designate(Place { step: self.cursor.step, pixel, camera: self.camera() });
+                    self.designate(ImagePosition { step: self.cursor.step, pixel, camera: self.camera() });
                 }
             }
         }
     }
 
-    /// Whether the map will say something of a place, and does not yet.
-    pub(crate) fn is_to_be_judged(&self, place: Place) -> bool {
+    /// Whether the map has no verdict for a position yet, but will have one.
+    pub(crate) fn is_to_be_judged(&self, place: ImagePosition) -> bool {
         let progress = self.trackability.progress.as_ref();
         let is_coming = match progress {
             Some(progress) => !progress.ended,
-            None => self.trackability.is_asked || self.trackability.is_stale,
+            None => self.trackability.is_pending || self.trackability.is_stale,
         };
         is_coming && place.camera.is_none() && self.trackability_at(place.pixel).is_none()
     }
 
-    /// The advice against a place that the map calls risky or poor; `None` without a map.
-    pub(crate) fn advised_against(&self, place: Place) -> Option<Refusal> {
+    /// The advice against a position whose verdict is risky or poor; `None` without a map.
+    pub(crate) fn advised_against(&self, place: ImagePosition) -> Option<Refusal> {
         let cell = self.trackability_at(place.pixel).filter(|cell| cell.verdict != Verdict::Good)?;
         let word = cell.verdict.title();
         let sentence = cell.sentence().map_or_else(|| word.to_owned(), |why| format!("{word}: {why}"));
@@ -81,7 +81,7 @@ impl State {
         Some(Refusal { place, sentence, nearest, is_advice: true })
     }
 
-    /// The first aim of the keys: the refused pixel, else the middle of the view.
+    /// The initial aim of the keys: the refused pixel, otherwise the centre of the view.
     pub(crate) fn first_aim(&self) -> Pixel {
         let [width, height] = self.left_size().unwrap_or([1, 1]);
         let middle = match self.views.left {
@@ -91,7 +91,7 @@ impl State {
         self.refusal.as_ref().map_or(middle, |refusal| refusal.place.pixel)
     }
 
-    /// Reads the map while a target is picked; cancels it when the pick ends.
+    /// Reads the map while a target is being picked; cancels it afterwards.
     pub(crate) fn sync_trackability(&mut self) {
         let limits = &self.trackability.limits;
         let here = self.traverse.as_ref().map(|open| (open.id.clone(), self.cursor.step, limits.clone()));
@@ -110,23 +110,23 @@ impl State {
             (known.is_stale, known.place) = (wanted.is_some(), wanted);
             if let Some(place) = unfinished {
                 let call = map_call::<CancelTrackability>(&place);
-                // A refusal means that the map was finished meanwhile.
+                // A refusal means that the map was completed meanwhile.
                 self.call_with_problem::<CancelTrackability>(call, |_, _| {});
             }
         }
         let known = &mut self.trackability;
-        let wanted = known.place.clone().filter(|_| known.is_stale && !known.is_asked);
+        let wanted = known.place.clone().filter(|_| known.is_stale && !known.is_pending);
         if let Some(place) = wanted {
-            (known.is_asked, known.is_stale) = (true, false);
+            (known.is_pending, known.is_stale) = (true, false);
             let call = map_call::<ShowTrackability>(&place);
             self.call_with_problem::<ShowTrackability>(call, move |state, answer| {
-                state.took_trackability(&place, answer);
+                state.on_trackability_reply(&place, answer);
             });
         }
     }
 
-    /// Notes an event about new rows of a map.
-    pub(crate) fn trackability_went_on(&mut self, traverse: &str, step: usize) {
+    /// Handles an event about new rows of a map.
+    pub(crate) fn on_trackability_progress(&mut self, traverse: &str, step: usize) {
         let known = &mut self.trackability;
         let is_ours = known.place.as_ref().is_some_and(|(own, at, _)| own == traverse && *at == step);
         let is_made = known.progress.as_ref().is_some_and(|progress| progress.ended);
@@ -139,17 +139,17 @@ impl State {
         self.trackability.is_stale |= self.trackability.place.is_some() && !is_made;
     }
 
-    /// Takes an answer; picking works without a map too.
-    fn took_trackability(&mut self, place: &MapPlace, answer: Result<MapProgress, Problem>) {
+    /// Stores a reply about the map; picking also works without one.
+    fn on_trackability_reply(&mut self, place: &MapPlace, answer: Result<MapProgress, Problem>) {
         let known = &mut self.trackability;
         if known.place.as_ref() != Some(place) {
             return;
         }
-        known.is_asked = false;
+        known.is_pending = false;
         let waiting = known.judged;
         match answer {
             Ok(progress) => known.progress = Some(progress),
-            // The server is unreachable: read it again when it is back.
+            // The server is unreachable: the map is read again when it is back.
             Err(problem) if problem.status == 0 => {}
             Err(problem) => {
                 known.progress =
@@ -162,7 +162,7 @@ impl State {
     }
 }
 
-/// Calls `E` about the map of a stop.
+/// The call of `E` about the map of a stop.
 pub(crate) fn map_call<E>((traverse, step, limits): &MapPlace) -> Call
 where
     E: Endpoint<At = AtStop, Query = MapLimits, Body = NoBody>,
@@ -173,24 +173,24 @@ where
 
 impl State {
     /// Applies a command about the limits.
-    pub(crate) fn ask_limits(&mut self, ask: Ask) {
+    pub(crate) fn apply_limits_command(&mut self, command: LimitsCommand) {
         let known = &mut self.trackability;
-        match ask {
-            Ask::Open => known.form = Some(Form::of(&known.limits)),
-            Ask::Close => known.form = None,
-            Ask::Type { key, text } => {
+        match command {
+            LimitsCommand::Open => known.form = Some(LimitsForm::of(&known.limits)),
+            LimitsCommand::Close => known.form = None,
+            LimitsCommand::Type { key, text } => {
                 if let Some(form) = &mut known.form {
                     form.texts.insert(key, text);
                     form.refused = None;
                 }
             }
-            Ask::Defaults => known.form = Some(Form::of(&Changes::new())),
-            Ask::Use => {
+            LimitsCommand::Defaults => known.form = Some(LimitsForm::of(&Changes::new())),
+            LimitsCommand::Use => {
                 let Some(form) = &mut known.form else { return };
                 match form.changes() {
                     Ok(limits) => {
                         (known.limits, known.form) = (limits, None);
-                        // The map is shown while a target is picked.
+                        // The map is visible only while a target is being picked.
                         self.set_mode(Mode::Pick);
                     }
                     Err(sentence) => form.refused = Some(sentence),

@@ -1,5 +1,4 @@
-//! What is tried at a step, and the scores that come of it: asked for while they are looked at, and made a texture of
-//! when they are shown.
+//! The trial at a step and its scores, which are requested only while they are shown.
 
 pub(crate) mod panel;
 mod update;
@@ -11,38 +10,38 @@ use sightline_session::what_if::{Ghost, WhatIf};
 use crate::cache::StepKey;
 use crate::drawing::raster::Raster;
 
-/// What is tried at a step.
+/// A trial: changes to a step that are tried without a new run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trial {
     /// The step.
     pub of: StepKey,
     /// The change.
     pub what_if: WhatIf,
-    /// What came of the newest change that was answered.
+    /// Result of the newest answered change (the ghost); `None` before the first answer.
     pub ghost: Option<Ghost>,
-    /// Whether its scores were asked for with it.
+    /// Whether the result was requested with its scores.
     pub has_scores: bool,
-    /// Why the newest change could not be tried.
+    /// Why the server refused the newest change.
     pub refused: Option<String>,
 }
 
-/// Which scores are shown while a change is tried.
+/// The scores that are shown during a trial.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Scores {
-    /// Those of the run beside those of what is tried.
+    /// The run's scores beside the trial's.
     #[default]
     Both,
-    /// Those of the run.
+    /// The run's scores.
     Recorded,
-    /// Those of what is tried.
+    /// The trial's scores.
     Tried,
 }
 
 impl Scores {
-    /// All of them.
+    /// All choices.
     pub const ALL: [Self; 3] = [Self::Both, Self::Recorded, Self::Tried];
 
-    /// Its words.
+    /// The label of the choice.
     pub const fn words(self) -> &'static str {
         match self {
             Self::Both => "both",
@@ -52,5 +51,5 @@ impl Scores {
     }
 }
 
-/// The texture of the scores that were shown last, with what they are of.
-pub(crate) type Shown = egui::mutex::Mutex<Option<((StepKey, WhatIf), Arc<Raster>)>>;
+/// The last texture of the trial's scores, with the step and the change that it shows.
+pub(crate) type ScoresTexture = egui::mutex::Mutex<Option<((StepKey, WhatIf), Arc<Raster>)>>;

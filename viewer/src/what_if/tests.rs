@@ -1,5 +1,5 @@
-//! The scores of what is tried: asked for while they are seen, drawn beside those of the run, and put in words; the card
-//! covers nothing that is looked at.
+//! The scores of a trial: requested while they are visible, drawn beside those of the run, and described; the card covers
+//! neither target nor search window.
 
 use egui::accesskit::Role;
 use egui_kittest::kittest::{NodeT, Queryable};
@@ -16,7 +16,7 @@ use crate::state::State;
 use crate::tests::calls::{self, bodies};
 use crate::tests::{Shown, fixture};
 use crate::what_if::Scores;
-use crate::why::Ask;
+use crate::why::WhyCommand;
 
 const STEP: usize = 3;
 const SIDE: u32 = 31;
@@ -25,7 +25,7 @@ fn what_if(arrays: Vec<ArrayName>) -> WhatIf {
     WhatIf { settings: Changes::from([("ncc_min".to_owned(), json!(0.4))]), arrays, ..WhatIf::default() }
 }
 
-fn asked(state: &mut State) -> Vec<WhatIf> {
+fn requested_trials(state: &mut State) -> Vec<WhatIf> {
     bodies::<TryStep>(state)
 }
 
@@ -41,8 +41,8 @@ fn answer(state: &mut State, arrays: Vec<ArrayName>) {
 
 fn trying(context: &egui::Context) -> State {
     let mut state = fixture::at_step(context, STEP);
-    state.perform(Command::Why(Ask::Try(what_if(Vec::new()))));
-    state.want_tried_scores(true);
+    state.perform(Command::Why(WhyCommand::Try(what_if(Vec::new()))));
+    state.show_trial_scores(true);
     state.take_requests();
     answer(&mut state, Vec::new());
     answer(&mut state, vec![ArrayName::SURFACE]);
@@ -52,24 +52,31 @@ fn trying(context: &egui::Context) -> State {
 #[test]
 fn scores_are_asked_for_only_while_they_are_seen() {
     let mut state = fixture::at_step(&egui::Context::default(), STEP);
-    state.perform(Command::Why(Ask::Try(what_if(Vec::new()))));
-    assert_eq!(asked(&mut state), [what_if(Vec::new())], "nobody sees the scores");
+    state.perform(Command::Why(WhyCommand::Try(what_if(Vec::new()))));
+    assert_eq!(requested_trials(&mut state), [what_if(Vec::new())], "nobody sees the scores");
     answer(&mut state, Vec::new());
-    state.want_tried_scores(false);
-    assert!(asked(&mut state).is_empty());
-    state.want_tried_scores(true);
-    assert_eq!(asked(&mut state), [what_if(vec![ArrayName::SURFACE])], "the panel came to the front");
-    state.want_tried_scores(true);
-    assert!(asked(&mut state).is_empty(), "once");
+    state.show_trial_scores(false);
+    assert!(requested_trials(&mut state).is_empty());
+    state.show_trial_scores(true);
+    assert_eq!(
+        requested_trials(&mut state),
+        [what_if(vec![ArrayName::SURFACE])],
+        "the panel came to the front"
+    );
+    state.show_trial_scores(true);
+    assert!(requested_trials(&mut state).is_empty(), "once");
     answer(&mut state, vec![ArrayName::SURFACE]);
-    state.want_tried_scores(true);
-    assert!(asked(&mut state).is_empty(), "they are here");
+    state.show_trial_scores(true);
+    assert!(requested_trials(&mut state).is_empty(), "they are here");
     assert_eq!(state.trial().unwrap().ghost.as_ref().unwrap().what_if, what_if(Vec::new()));
-    state.perform(Command::Why(Ask::Scores(Scores::Recorded)));
-    state.want_tried_scores(true);
-    state.perform(Command::Why(Ask::Change { key: "ncc_min".to_owned(), value: Some(json!(0.3)) }));
-    state.want_tried_scores(true);
-    assert!(asked(&mut state).iter().all(|what_if| what_if.arrays.is_empty()), "those of the run are shown");
+    state.perform(Command::Why(WhyCommand::Scores(Scores::Recorded)));
+    state.show_trial_scores(true);
+    state.perform(Command::Why(WhyCommand::Change { key: "ncc_min".to_owned(), value: Some(json!(0.3)) }));
+    state.show_trial_scores(true);
+    assert!(
+        requested_trials(&mut state).iter().all(|what_if| what_if.arrays.is_empty()),
+        "those of the run are shown"
+    );
 }
 
 #[test]
@@ -88,11 +95,11 @@ fn the_scores_of_what_is_tried_stand_beside_those_of_the_run_with_the_difference
         ("scores: what if", Scores::Tried),
         ("scores: both", Scores::Both),
     ] {
-        assert_eq!(shown.click(label), vec![Command::Why(Ask::Scores(choice))]);
+        assert_eq!(shown.click(label), vec![Command::Why(WhyCommand::Scores(choice))]);
     }
     let alone = Shown::pane(Pane::Surface, |context| {
         let mut state = trying(context);
-        state.perform(Command::Why(Ask::Scores(Scores::Tried)));
+        state.perform(Command::Why(WhyCommand::Scores(Scores::Tried)));
         state
     });
     alone.says("what if, ").says("colours -1 to +1");
@@ -106,7 +113,7 @@ fn the_scores_of_what_is_tried_stand_beside_those_of_the_run_with_the_difference
 fn scores_that_are_missing_say_why() {
     let on_the_way = Shown::pane(Pane::Surface, |context| {
         let mut state = fixture::at_step(context, STEP);
-        state.perform(Command::Why(Ask::Try(what_if(Vec::new()))));
+        state.perform(Command::Why(WhyCommand::Try(what_if(Vec::new()))));
         state
     });
     on_the_way.says("What if: computing the scores");
@@ -120,7 +127,7 @@ fn scores_that_are_missing_say_why() {
     none.says("What if has no scores: this step did not reach the search.");
 }
 
-/// Where the left image is, and on it the target and the search window; and the panel.
+/// The rectangles of the left image, of the target and the search window on it, and of the panel.
 fn left_image(
     size: [f32; 2],
     view: View2d,
@@ -151,7 +158,7 @@ fn the_card_covers_no_target_and_the_image_keeps_its_size() {
     for (size, scale, is_strip) in [
         ([900.0, 700.0], 0.5, false),
         ([900.0, 700.0], 8.0, true),
-        // So small an image has no corner that is large enough.
+        // In such a small image no corner is large enough.
         ([420.0, 380.0], 0.2, true),
         ([420.0, 380.0], 3.0, true),
     ] {

@@ -13,7 +13,7 @@ use sightline_vision::image::GrayImage;
 use crate::cache::StepKey;
 use crate::drawing::raster::Raster;
 use crate::state::State;
-use crate::state::deeds::Deed;
+use crate::state::undoable::UndoableChange;
 use crate::what_if::{Scores, Trial};
 
 impl State {
@@ -24,7 +24,7 @@ impl State {
         if before == what_if {
             return;
         }
-        self.did(Deed::Tried { of: key.clone(), before, after: what_if.clone() });
+        self.record_change(UndoableChange::Tried { of: key.clone(), before, after: what_if.clone() });
         self.set_trial(key, what_if);
     }
 
@@ -33,7 +33,7 @@ impl State {
             self.why.trial = None;
             return;
         }
-        // The last ghost stays until the new one arrives, so that a drag does not flicker.
+        // The last result remains until the new one arrives, so that a drag does not flicker.
         let last = self.why.trial.take().filter(|trial| trial.of == of);
         let has_scores = last.as_ref().is_some_and(|trial| trial.has_scores);
         let ghost = last.and_then(|trial| trial.ghost);
@@ -57,15 +57,15 @@ impl State {
         self.why.trying = Some((of.clone(), what_if.clone()));
         let call = Call::with_body::<TryStep>(&of, &what_if);
         self.call_with_problem::<TryStep>(call, move |state, outcome| {
-            state.took_ghost(&of, what_if, outcome);
+            state.on_trial_reply(&of, what_if, outcome);
         });
     }
 
-    /// Takes the result of a trial, or why it was refused; then sends the newest change.
-    fn took_ghost(&mut self, of: &StepKey, mut what_if: WhatIf, outcome: Result<Ghost, Problem>) {
+    /// Stores the result of a trial, or why it was refused; then sends the newest change.
+    fn on_trial_reply(&mut self, of: &StepKey, mut what_if: WhatIf, outcome: Result<Ghost, Problem>) {
         self.why.trying = None;
         let has_scores = !what_if.arrays.is_empty();
-        // The requested arrays are no part of the change.
+        // The requested arrays are not part of the change.
         what_if.arrays.clear();
         if let Some(trial) = self.why.trial.as_mut().filter(|trial| trial.of == *of) {
             let is_newest = trial.what_if == what_if;
@@ -82,8 +82,8 @@ impl State {
         self.send_trial();
     }
 
-    /// Sets whether the scores of the trial are shown; requests the trial again if they are missing.
-    pub fn want_tried_scores(&mut self, is_seen: bool) {
+    /// Sets whether the scores of the trial are visible; requests the trial again if they are missing.
+    pub fn show_trial_scores(&mut self, is_seen: bool) {
         let is_wanted =
             is_seen && self.why.scores_shown != Scores::Recorded && self.tracker() == TrackerKind::Template;
         self.why.wants_scores = is_wanted;
@@ -93,7 +93,7 @@ impl State {
     }
 
     /// The result of the trial at the cursor's step with its scores; `None` until both have arrived.
-    pub(crate) fn tried_scores(&self, context: &egui::Context) -> Option<(&Ghost, Arc<Raster>)> {
+    pub(crate) fn trial_scores(&self, context: &egui::Context) -> Option<(&Ghost, Arc<Raster>)> {
         let trial = self.trial()?;
         let ghost = trial.ghost.as_ref()?;
         let array = ghost.arrays.iter().find(|array| array.name == ArrayName::SURFACE)?;

@@ -1,4 +1,4 @@
-//! The card of Why and what belongs to it: the headline, the pose change, the tree in view, and the end of a trial.
+//! The card of Why and related parts: the headline, the pose change, the tree in view, and the end of a trial.
 
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
@@ -18,23 +18,23 @@ use crate::drawing::view2d::View2d;
 use crate::panels::pane::Pane;
 use crate::tests::calls::answer;
 use crate::tests::{Shown, fixture};
-use crate::why::Ask;
+use crate::why::WhyCommand;
 
 #[test]
 fn after_a_branch_nothing_is_tried_any_more() {
     let mut state = lost();
     let what_if = changing("ncc_min", json!(0.4));
-    state.perform(Command::Why(Ask::Try(what_if.clone())));
+    state.perform(Command::Why(WhyCommand::Try(what_if.clone())));
     answer::<TryStep>(&mut state, &ghost(what_if.clone()));
-    state.perform(Command::Why(Ask::Branch));
+    state.perform(Command::Why(WhyCommand::Branch));
     let run = RunView { number: 1, fork: Some(Fork::new(0, LOST)), ..state.run().unwrap().clone() };
     answer::<ForkRun>(&mut state, &run);
     assert_eq!(state.cursor.run, 1);
-    state.perform(Command::Look { target: 0, run: 0 });
+    state.perform(Command::SelectRun { target: 0, run: 0 });
     assert!(state.trial().is_none(), "the card is gone from the run that was left");
-    // Taking the branch back and doing it again brings no card either.
-    state.perform(Command::Why(Ask::Undo));
-    state.perform(Command::Why(Ask::Redo));
+    // Undoing and redoing the branch does not restore the card either.
+    state.perform(Command::Why(WhyCommand::Undo));
+    state.perform(Command::Why(WhyCommand::Redo));
     assert!(state.why.trial.is_none());
 }
 
@@ -55,7 +55,7 @@ fn a_tree_that_is_asked_for_is_scrolled_into_view_and_the_key_of_the_panel_bring
         [420.0, 150.0],
         move |context| {
             let mut state = fixture::at_step(context, LOST);
-            state.perform(Command::Why(Ask::Value { step: LOST, value: "state".to_owned() }));
+            state.perform(Command::Why(WhyCommand::Value { step: LOST, value: "state".to_owned() }));
             answer::<ShowWhy>(&mut state, &explanation);
             *made.borrow_mut() = Some(state);
             fixture::at_step(context, LOST)
@@ -74,7 +74,7 @@ fn a_tree_that_is_asked_for_is_scrolled_into_view_and_the_key_of_the_panel_bring
     let title = shown.harness.get_by_label_contains("WHY STATE, RUN A").rect();
     assert!(title.top() >= 0.0 && title.bottom() <= 150.0, "{title:?}");
     assert!(headline(&shown) < before, "the tree was below the fold");
-    asked.borrow_mut().as_mut().unwrap().perform(Command::Why(Ask::Selected));
+    asked.borrow_mut().as_mut().unwrap().perform(Command::Why(WhyCommand::Selected));
     shown.harness.run_steps(60);
     assert!((headline(&shown) - before).abs() < 1.0, "{} and {before}", headline(&shown));
 }
@@ -103,7 +103,7 @@ fn predict_shows_the_pose_change_with_sigma_and_error() {
         state.perform(Command::SelectStage(Stage::PREDICT));
         state
     });
-    // 1 m and 7 cm ahead; 2 % of the way along and across; 7 cm too far.
+    // 1 m and 7 cm ahead; 2 % of the distance along and across; 7 cm too far.
     shown.says("POSE CHANGE SINCE THE STOP BEFORE").says("Δyaw").says("+107.00 cm").says("2.15 cm");
     shown.says("+7.00 cm").says("0.20°");
 }

@@ -1,24 +1,25 @@
-//! Why follows the cursor: the value that was asked for last is asked again where the cursor goes, in whichever run.
+//! The panel “Why” follows the cursor: it explains the value requested last at each step that the cursor reaches, in any
+//! run.
 //!
-//! Only a move of the cursor does that, so that a value of an earlier step can be looked into from where one is. While an
-//! answer is waited for no further one is asked: who plays or drags gets the tree of where the cursor comes to rest. A step
-//! whose record is not here yet, or lacks the value, leaves the tree of the step before, which says whose it is.
+//! Only a move of the cursor triggers this, so that the user can examine a value of an earlier step. While a request is
+//! pending no further one is sent: during playback or a drag, only the step where the cursor stops is explained. If a
+//! step's record is not loaded or lacks the value, the previous step's explanation remains, labelled with its step.
 
 use crate::cache::StepKey;
 use crate::state::State;
-use crate::why::Told;
+use crate::why::Remote;
 
 impl State {
-    /// Follows the cursor, where the panel is on the screen.
+    /// Requests the explanation at the cursor's step, if the cursor has moved. Called while the panel is visible.
     pub fn follow_why(&mut self) {
         let here = self.step_key(self.cursor.step).filter(|_| self.row().is_some());
         let Some(here) = here.filter(|here| self.why.followed.as_ref() != Some(here)) else { return };
-        let Some((shown, value)) = self.why.asked.last().cloned() else {
+        let Some((shown, value)) = self.why.history.last().cloned() else {
             self.why.followed = Some(here);
             return;
         };
         let place = (shown, value);
-        if matches!(self.why.trees.get(&place), Some(Told::Waiting)) {
+        if matches!(self.why.trees.get(&place), Some(Remote::Pending)) {
             return;
         }
         let (shown, value) = place;
@@ -27,20 +28,20 @@ impl State {
         }
         self.why.followed = Some(here.clone());
         if shown != here {
-            self.want_tree(&here, &value);
-            self.why.asked = vec![(here, value)];
+            self.request_explanation(&here, &value);
+            self.why.history = vec![(here, value)];
         }
     }
 
-    /// Asks again for what the server could not say while it was gone.
-    pub(crate) fn ask_why_again(&mut self) {
-        self.why.trees.retain(|_, told| matches!(told, Told::Here(_)));
-        if let Some((key, value)) = self.why.asked.last().cloned() {
-            self.want_tree(&key, &value);
+    /// Requests again the explanations that failed while the server was unreachable.
+    pub(crate) fn request_explanation_again(&mut self) {
+        self.why.trees.retain(|_, remote| matches!(remote, Remote::Received(_)));
+        if let Some((key, value)) = self.why.history.last().cloned() {
+            self.request_explanation(&key, &value);
         }
     }
 
-    /// Whose value is shown, in words: step and run, and the target where it is not the one that is looked at.
+    /// The origin of the shown value as words: step and run, and the target if it is not selected.
     pub fn whose(&self, key: &StepKey) -> String {
         let targets = self.session.iter().flat_map(|session| &session.targets);
         let other = targets.filter(|target| Some(target.number) != self.cursor.target);

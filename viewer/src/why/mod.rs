@@ -1,9 +1,9 @@
-//! Why a step came out as it did, what would have saved it, and what if: asked of the server and kept by step.
+//! Explanations of a step, its counterfactuals, and trials (what-if): requested from the server and stored by step.
 //!
-//! A what-if belongs to one step. While it changes, at most one of its requests is under way; when the answer comes, the
-//! newest change is asked for next, so that dragging never queues.
+//! A trial belongs to one step. At most one of its requests is pending; when the reply arrives, the newest change is
+//! requested next, so that a drag never fills a queue.
 
-mod book;
+mod step_context;
 mod follow;
 pub(crate) mod panel;
 mod update;
@@ -20,126 +20,126 @@ use crate::cache::StepKey;
 use crate::what_if;
 use crate::what_if::{Scores, Trial};
 
-/// What a person asks about a step.
+/// A command about a step.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Ask {
-    /// Where a value came from.
+pub enum WhyCommand {
+    /// Explains a value.
     Value {
         /// The step.
         step: usize,
         /// The value's name.
         value: String,
     },
-    /// Where the value came from that was asked for before.
+    /// Returns to the previously explained value.
     Back,
-    /// Where the selected value came from: the last one asked for, else the worst criterion.
+    /// Explains the last requested value, otherwise the gate with the smallest margin.
     Selected,
-    /// What would have saved the step.
+    /// Searches for counterfactuals: changes that would have saved the step.
     Saved,
-    /// To stop looking for that.
+    /// Cancels that search.
     CancelSaved,
-    /// To try a change in place of what is tried.
+    /// Replaces the trial.
     Try(WhatIf),
-    /// To try another value of a setting; none takes the change back.
+    /// Tries another value of a setting; `None` reverts it.
     Change {
         /// The setting's name.
         key: String,
         /// The value.
         value: Option<Value>,
     },
-    /// To try another place of the prediction.
+    /// Tries another position of the prediction; `None` reverts it.
     Displace(Option<Pixel>),
-    /// Which scores are shown while a change is tried.
+    /// Selects the scores that are shown during a trial.
     Scores(Scores),
-    /// To stop trying.
+    /// Discards the trial.
     Discard,
-    /// To run from here as a branch with what is tried.
+    /// Forks the run at this step with the changes of the trial.
     Branch,
-    /// To run from here as a branch with a change.
+    /// Forks the run at this step with these changes.
     BranchWith(WhatIf),
-    /// To remove a run.
+    /// Removes a run.
     RemoveRun {
         /// The target's number.
         target: usize,
         /// The run's number.
         run: usize,
     },
-    /// To take the last deed back.
+    /// Undoes the last change.
     Undo,
-    /// To do it again.
+    /// Redoes the change undone last.
     Redo,
 }
 
-/// Something that was asked of the server.
+/// A value requested from the server.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Told<T> {
-    /// It was asked.
-    Waiting,
-    /// It is here.
-    Here(T),
-    /// It was refused, with the server's sentence.
+pub enum Remote<T> {
+    /// The request is pending.
+    Pending,
+    /// The value was received.
+    Received(T),
+    /// The request was refused; the server's sentence.
     Refused(String),
 }
 
-/// The part of the panel that a person asked for, which scrolls into view.
+/// The part of the panel that the user requested last and that is scrolled into view.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct InView {
-    /// How often something was asked for; 0 before the first time.
+pub(crate) struct ScrollRequest {
+    /// Number of requests so far; 0 before the first.
     pub count: usize,
-    /// Which one.
-    pub part: Part,
+    /// The requested part.
+    pub part: WhySection,
 }
 
-/// A part of the panel that scrolls into view when a person asks for it.
+/// A part of the panel that a request scrolls into view.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) enum Part {
+pub(crate) enum WhySection {
     /// The headline with its bullets.
     #[default]
     Card,
-    /// The tree of a value.
+    /// The explanation of a value.
     Tree,
-    /// What would have saved the step.
+    /// The counterfactuals of the step.
     Saved,
 }
 
-impl InView {
-    /// Something else was asked for.
-    fn ask(&mut self, part: Part) {
+impl ScrollRequest {
+    /// Requests another part.
+    fn request(&mut self, part: WhySection) {
         *self = Self { count: self.count + 1, part };
     }
 }
 
-/// What is asked and known.
+/// State of the explanations, counterfactuals and the trial.
 #[derive(Default)]
 pub struct Why {
-    /// The values that were asked for, the last one shown.
-    pub asked: Vec<(StepKey, String)>,
-    /// Where they came from.
-    pub trees: BTreeMap<(StepKey, String), Told<Explanation>>,
-    /// What is tried.
+    /// The explained values, newest last; the newest is shown.
+    pub history: Vec<(StepKey, String)>,
+    /// The explanations by step and value.
+    pub trees: BTreeMap<(StepKey, String), Remote<Explanation>>,
+    /// The current trial.
     pub trial: Option<Trial>,
-    /// What would have saved steps.
-    pub questions: BTreeMap<StepKey, Told<Question>>,
-    /// Which scores are shown while a change is tried.
+    /// The counterfactuals by step.
+    pub questions: BTreeMap<StepKey, Remote<Question>>,
+    /// The scores that are shown during a trial.
     pub scores_shown: Scores,
-    /// The texture of those of the change.
-    pub scores: what_if::Shown,
-    /// Whether they are looked at.
+    /// The texture of the trial's scores.
+    pub scores: what_if::ScoresTexture,
+    /// Whether the trial's scores are visible.
     pub(crate) wants_scores: bool,
-    /// The change that the server tries now.
+    /// The change that the server is computing.
     pub(crate) trying: Option<(StepKey, WhatIf)>,
-    /// Where the cursor was when it was followed last, or when a value was asked for.
+    /// The cursor's step when it was last followed, or when a value was requested.
     pub(crate) followed: Option<StepKey>,
-    /// The part of the panel that was asked for last.
-    pub(crate) in_view: InView,
-    /// The steps whose question was looked for.
-    looked_for: BTreeSet<StepKey>,
+    /// The part of the panel that was requested last.
+    pub(crate) scroll_request: ScrollRequest,
+    /// The steps for which the server was asked for existing counterfactuals.
+    checked_questions: BTreeSet<StepKey>,
 }
 
 impl Why {
-    /// Another session was opened: nothing of the last one is shown or followed any more.
+    /// Clears the explanations and the trial of the previous session.
     pub(crate) fn leave_session(&mut self) {
-        self.asked.clear();
+        self.history.clear();
         (self.trial, self.trying, self.followed) = (None, None, None);
     }
 }

@@ -1,4 +1,4 @@
-//! Why, what if, and what would have saved it: what the panels show and what the state asks for.
+//! Why, what-if, and counterfactuals: display of the panels and requests of the state.
 
 use egui_kittest::kittest::{NodeT, Queryable};
 use serde_json::json;
@@ -25,9 +25,9 @@ use crate::state::State;
 use crate::state::effect::Effect;
 use crate::tests::calls::{answer, bodies, calls_of, refuse};
 use crate::tests::{Shown, fixture};
-use crate::why::{Ask, Told};
+use crate::why::{Remote, WhyCommand};
 
-/// The step that is lost.
+/// The step at which the target is lost.
 pub(super) const LOST: usize = 3;
 
 pub(super) fn key() -> StepKey {
@@ -92,9 +92,9 @@ fn the_panel_says_the_verdict_and_lists_the_criteria_worst_first() {
     let mut shown = Shown::pane(Pane::Why, |context| fixture::at_step(context, LOST));
     shown.says("Rejected: match score 0.410 is below 0.700 by 0.290").says("px from the truth");
     shown.says("Correct rejection: the match is ");
-    let value = |name: &str| vec![Command::Why(Ask::Value { step: LOST, value: name.to_owned() })];
+    let value = |name: &str| vec![Command::Why(WhyCommand::Value { step: LOST, value: name.to_owned() })];
     assert_eq!(shown.click("Why this state?"), value("state"));
-    assert_eq!(shown.click("What would have saved it?"), vec![Command::Why(Ask::Saved)]);
+    assert_eq!(shown.click("What would have saved it?"), vec![Command::Why(WhyCommand::Saved)]);
 }
 
 #[test]
@@ -119,7 +119,7 @@ fn a_slider_stays_the_same_one_when_a_value_is_explained_above_it() {
             move |context| {
                 let mut state = fixture::at_step(context, LOST);
                 if is_explained {
-                    state.perform(Command::Why(Ask::Value { step: LOST, value: "ncc".to_owned() }));
+                    state.perform(Command::Why(WhyCommand::Value { step: LOST, value: "ncc".to_owned() }));
                 }
                 state
             },
@@ -144,7 +144,7 @@ fn while_a_change_is_tried_only_the_newest_is_asked_for_next() {
     let mut state = lost();
     let side = |side: u64| changing("search_window_px", json!(side));
     for value in [61, 81, 101] {
-        state.perform(Command::Why(Ask::Change {
+        state.perform(Command::Why(WhyCommand::Change {
             key: "search_window_px".to_owned(),
             value: Some(json!(value)),
         }));
@@ -156,12 +156,12 @@ fn while_a_change_is_tried_only_the_newest_is_asked_for_next() {
     assert_eq!(calls_of::<TryStep>(&mut state), [trial(101)], "the newest, not the next");
     answer::<TryStep>(&mut state, &ghost(side(101)));
     assert!(calls_of::<TryStep>(&mut state).is_empty());
-    // Dragging is one deed.
-    state.perform(Command::Why(Ask::Undo));
+    // A drag is one change.
+    state.perform(Command::Why(WhyCommand::Undo));
     assert!(state.trial().is_none());
-    state.perform(Command::Why(Ask::Redo));
+    state.perform(Command::Why(WhyCommand::Redo));
     assert_eq!(state.trial().unwrap().what_if, side(101));
-    // At another step nothing is tried.
+    // Another step has no trial.
     state.perform(Command::Go(Go::By(-1)));
     assert!(state.trial().is_none());
 }
@@ -169,7 +169,7 @@ fn while_a_change_is_tried_only_the_newest_is_asked_for_next() {
 #[test]
 fn a_change_that_is_refused_says_so_in_the_card_and_loses_nothing() {
     let mut state = lost();
-    state.perform(Command::Why(Ask::Try(changing("search_window_px", json!(61)))));
+    state.perform(Command::Why(WhyCommand::Try(changing("search_window_px", json!(61)))));
     let (code, title, detail) =
         ("setting".to_owned(), String::new(), "search_window_px must be odd".to_owned());
     let problem =
@@ -185,13 +185,13 @@ fn the_ghost_has_a_card_with_what_changed_and_what_can_be_done() {
     let mut shown = Shown::pane(Pane::Left, |context| {
         let mut state = fixture::at_step(context, LOST);
         let what_if = changing("search_window_px", json!(81));
-        state.perform(Command::Why(Ask::Try(what_if.clone())));
+        state.perform(Command::Why(WhyCommand::Try(what_if.clone())));
         answer::<TryStep>(&mut state, &ghost(what_if));
         state
     });
     shown.says("search window 143 → 81 px").says("Lost → Tracking").says("Δ +0.420");
-    assert_eq!(shown.click("Run from here as branch"), vec![Command::Why(Ask::Branch)]);
-    assert_eq!(shown.click("discard what if"), vec![Command::Why(Ask::Discard)]);
+    assert_eq!(shown.click("Run from here as branch"), vec![Command::Why(WhyCommand::Branch)]);
+    assert_eq!(shown.click("discard what if"), vec![Command::Why(WhyCommand::Discard)]);
 }
 
 #[test]
@@ -216,14 +216,17 @@ fn the_left_image_has_handles_with_names() {
 fn a_branch_takes_settings_and_prediction_along() {
     let mut state = lost();
     let pixel = Pixel::new(500.0, 470.0);
-    state.perform(Command::Why(Ask::Change { key: "ncc_min".to_owned(), value: Some(json!(0.4)) }));
-    state.perform(Command::Why(Ask::Displace(Some(pixel))));
-    assert_eq!(keys::command(egui::Key::R, egui::Modifiers::NONE, &state), Some(Command::Why(Ask::Branch)));
+    state.perform(Command::Why(WhyCommand::Change { key: "ncc_min".to_owned(), value: Some(json!(0.4)) }));
+    state.perform(Command::Why(WhyCommand::Displace(Some(pixel))));
+    assert_eq!(
+        keys::command(egui::Key::R, egui::Modifiers::NONE, &state),
+        Some(Command::Why(WhyCommand::Branch))
+    );
     assert_eq!(
         keys::command(egui::Key::Escape, egui::Modifiers::NONE, &state),
-        Some(Command::Why(Ask::Discard))
+        Some(Command::Why(WhyCommand::Discard))
     );
-    state.perform(Command::Why(Ask::Branch));
+    state.perform(Command::Why(WhyCommand::Branch));
     let [new] = bodies::<ForkRun>(&mut state).try_into().unwrap();
     assert_eq!((new.run, new.from_step, new.prediction_px), (0, LOST, Some(pixel)));
     assert_eq!(new.settings, Changes::from([("ncc_min".to_owned(), json!(0.4))]));
@@ -256,7 +259,7 @@ fn the_findings_can_be_tried_and_run_from_here() {
         move |context| {
             let mut state = fixture::at_step(context, LOST);
             let question = question(QuestionState::Done, vec![right, false_one]);
-            state.perform(Command::Why(Ask::Saved));
+            state.perform(Command::Why(WhyCommand::Saved));
             answer::<AskCounterfactual>(&mut state, &question);
             state
         },
@@ -266,12 +269,12 @@ fn the_findings_can_be_tried_and_run_from_here() {
     );
     shown.says("Correct").says("change 42 %").says("prediction moved by (+5.0, +0.0) px");
     shown.says("Searched 31 changes (55 re-runs of this step)").says("1 without effect");
-    assert_eq!(shown.click("try finding 1"), vec![Command::Why(Ask::Try(tried))]);
-    assert_eq!(shown.click("try finding 1 with margin"), vec![Command::Why(Ask::Try(wide))]);
+    assert_eq!(shown.click("try finding 1"), vec![Command::Why(WhyCommand::Try(tried))]);
+    assert_eq!(shown.click("try finding 1 with margin"), vec![Command::Why(WhyCommand::Try(wide))]);
     shown.hides("Wrong target");
     shown.click("1 change leads to a wrong target");
     shown.harness.run_steps(20);
-    assert_eq!(shown.click("run from here with finding 2"), vec![Command::Why(Ask::BranchWith(run))]);
+    assert_eq!(shown.click("run from here with finding 2"), vec![Command::Why(WhyCommand::BranchWith(run))]);
 }
 
 #[test]
@@ -298,18 +301,18 @@ fn a_question_that_goes_on_shows_how_far_and_can_be_cancelled() {
     let mut shown = Shown::pane(Pane::Why, |context| {
         let mut state = fixture::at_step(context, LOST);
         let question = question(QuestionState::Running, vec![finding("ncc_min", 0.4, Outcome::Unknown)]);
-        state.want_question();
+        state.read_question_once();
         answer::<ShowCounterfactual>(&mut state, &question);
         state
     });
     shown.says("4 of 31: kernel").says("match score limit 0.7 → 0.4");
-    assert_eq!(shown.click("Cancel search"), vec![Command::Why(Ask::CancelSaved)]);
+    assert_eq!(shown.click("Cancel search"), vec![Command::Why(WhyCommand::CancelSaved)]);
 }
 
 #[test]
 fn an_explanation_of_another_target_is_not_shown() {
     let mut state = lost();
-    state.perform(Command::Why(Ask::Value { step: LOST, value: "state".to_owned() }));
+    state.perform(Command::Why(WhyCommand::Value { step: LOST, value: "state".to_owned() }));
     assert!(state.explained().is_some());
     state.cursor.target = Some(1);
     assert!(state.explained().is_none());
@@ -320,27 +323,27 @@ fn an_explanation_of_another_target_is_not_shown() {
 #[test]
 fn a_question_is_asked_once_followed_by_events_and_found_again_by_a_new_page() {
     let mut state = lost();
-    state.want_question();
-    state.want_question();
+    state.read_question_once();
+    state.read_question_once();
     let reads = |state: &mut State| calls_of::<ShowCounterfactual>(state).len();
     let unasked = question(QuestionState::Unasked, Vec::new());
     assert_eq!(reads(&mut state), 1, "looked for once");
     answer::<ShowCounterfactual>(&mut state, &unasked);
-    state.perform(Command::Why(Ask::Saved));
-    state.perform(Command::Why(Ask::Saved));
+    state.perform(Command::Why(WhyCommand::Saved));
+    state.perform(Command::Why(WhyCommand::Saved));
     assert_eq!(calls_of::<AskCounterfactual>(&mut state), [Call::to::<AskCounterfactual>(&key())]);
     let StepKey { session, target, run, step } = key();
-    state.told(Event::QuestionProgress { session, target, run, step, k: 1, n: 9, ended: false });
+    state.apply_event(Event::QuestionProgress { session, target, run, step, k: 1, n: 9, ended: false });
     assert_eq!(reads(&mut state), 1);
-    assert_eq!(state.question(), Some(&Told::Waiting));
-    // A page that missed events reads the session again, and what is still being answered with it.
+    assert_eq!(state.question(), Some(&Remote::Pending));
+    // A page that missed events reads the session and the unfinished searches again.
     let running = question(QuestionState::Running, Vec::new());
     answer::<ShowCounterfactual>(&mut state, &running);
-    state.told(Event::SessionChanged { session: "s1".to_owned() });
+    state.apply_event(Event::SessionChanged { session: "s1".to_owned() });
     assert_eq!(reads(&mut state), 1);
     let done = question(QuestionState::Done, Vec::new());
     answer::<ShowCounterfactual>(&mut state, &done);
-    state.told(Event::SessionChanged { session: "s1".to_owned() });
+    state.apply_event(Event::SessionChanged { session: "s1".to_owned() });
     assert_eq!(reads(&mut state), 0);
 }
 
@@ -382,25 +385,31 @@ fn a_value_shows_its_tree_and_each_line_of_it_can_be_asked_about() {
     };
     let mut shown = Shown::pane(Pane::Why, move |context| {
         let mut state = fixture::at_step(context, LOST);
-        state.perform(Command::Why(Ask::Value { step: LOST, value: "ncc".to_owned() }));
+        state.perform(Command::Why(WhyCommand::Value { step: LOST, value: "ncc".to_owned() }));
         assert_eq!(calls_of::<ShowWhy>(&mut state), [explain("ncc")]);
         assert!(state.take_effects().contains(&Effect::reveal(Pane::Why)), "the panel comes to the front");
         answer::<ShowWhy>(&mut state, &explanation);
         state
     });
     shown.says("= the score of the peak").says("from file: images/left_0003.png").says("· match_template");
-    let next = vec![Command::Why(Ask::Value { step: LOST, value: "peak_score".to_owned() })];
+    let next = vec![Command::Why(WhyCommand::Value { step: LOST, value: "peak_score".to_owned() })];
     assert_eq!(shown.click("score at the peak"), next);
 }
 
 #[test]
 fn w_asks_for_the_worst_criterion_first_and_numbers_elsewhere_lead_to_why() {
     let mut state = lost();
-    assert_eq!(keys::command(egui::Key::W, egui::Modifiers::NONE, &state), Some(Command::Why(Ask::Selected)));
-    assert_eq!(keys::command(egui::Key::C, egui::Modifiers::NONE, &state), Some(Command::Why(Ask::Saved)));
-    state.perform(Command::Why(Ask::Selected));
+    assert_eq!(
+        keys::command(egui::Key::W, egui::Modifiers::NONE, &state),
+        Some(Command::Why(WhyCommand::Selected))
+    );
+    assert_eq!(
+        keys::command(egui::Key::C, egui::Modifiers::NONE, &state),
+        Some(Command::Why(WhyCommand::Saved))
+    );
+    state.perform(Command::Why(WhyCommand::Selected));
     assert_eq!(calls_of::<ShowWhy>(&mut state), [explain("gate.ncc")]);
-    let value = |name: &str| vec![Command::Why(Ask::Value { step: LOST, value: name.to_owned() })];
+    let value = |name: &str| vec![Command::Why(WhyCommand::Value { step: LOST, value: name.to_owned() })];
     let mut gates = Shown::pane(Pane::Gates, |context| fixture::at_step(context, LOST));
     assert_eq!(gates.click("match score"), value("gate.ncc"));
     let mut status =

@@ -1,4 +1,4 @@
-//! The user's questions about a step, their calls, and what the replies change.
+//! The user's questions about a step, their calls, and the replies.
 
 use serde_json::Value;
 use sightline_api::endpoint::{Call, Endpoint, NoBody};
@@ -15,7 +15,7 @@ use crate::panels::pane::Pane;
 use crate::state::effect::Effect;
 use crate::state::{State, run_letter};
 use crate::what_if::Trial;
-use crate::why::{Ask, Part, Told};
+use crate::why::{Remote, WhyCommand, WhySection};
 
 /// Maximum number of values in the history of the panel.
 const REMEMBERED: usize = 50;
@@ -30,19 +30,19 @@ impl State {
     }
 
     /// The question about the cursor's step.
-    pub fn question(&self) -> Option<&Told<Question>> {
+    pub fn question(&self) -> Option<&Remote<Question>> {
         self.why.questions.get(&self.step_key(self.cursor.step)?)
     }
 
-    /// The value that is shown, with its tree: the last one that was asked for of the target at the cursor.
-    pub fn explained(&self) -> Option<(&StepKey, &str, &Told<Explanation>)> {
+    /// The shown value with its explanation: the last one requested for the selected target.
+    pub fn explained(&self) -> Option<(&StepKey, &str, &Remote<Explanation>)> {
         let is_of_target = |(key, _): &&(StepKey, String)| Some(key.target) == self.cursor.target;
-        let (key, value) = self.why.asked.last().filter(is_of_target)?;
+        let (key, value) = self.why.history.last().filter(is_of_target)?;
         let tree = self.why.trees.get(&(key.clone(), value.clone()))?;
         Some((key, value, tree))
     }
 
-    /// The branch that left the run at the cursor's step with exactly this change.
+    /// The branch that forked from the selected run at the cursor's step with exactly this change.
     pub fn branch_of(&self, what_if: &WhatIf) -> Option<&RunView> {
         let (step, parent) = (self.cursor.step, self.run()?);
         let is_it = |run: &&RunView| {
@@ -55,32 +55,32 @@ impl State {
         self.target()?.runs.iter().find(is_it)
     }
 
-    /// A setting as it is tried, else as it is in the run.
-    pub(crate) fn tried_setting(&self, group: &str, key: &str) -> Option<Value> {
+    /// A setting of the trial, otherwise of the run.
+    pub(crate) fn trial_setting(&self, group: &str, key: &str) -> Option<Value> {
         let tried = self.trial().and_then(|trial| trial.what_if.settings.get(key)).cloned();
         tried.or_else(|| self.setting(group, key))
     }
 
     /// Applies a command about a step.
-    pub(crate) fn ask_why(&mut self, ask: Ask) {
-        match ask {
-            Ask::Value { step, value } => {
-                self.why.in_view.ask(Part::Tree);
-                self.ask_value(step, value);
+    pub(crate) fn apply_why_command(&mut self, command: WhyCommand) {
+        match command {
+            WhyCommand::Value { step, value } => {
+                self.why.scroll_request.request(WhySection::Tree);
+                self.explain_value(step, value);
             }
-            Ask::Back => {
-                self.why.in_view.ask(Part::Tree);
-                self.why.asked.pop();
+            WhyCommand::Back => {
+                self.why.scroll_request.request(WhySection::Tree);
+                self.why.history.pop();
             }
-            Ask::Selected => self.ask_selected(),
-            Ask::Saved => self.ask_what_saves(),
-            Ask::CancelSaved => {
+            WhyCommand::Selected => self.explain_selected(),
+            WhyCommand::Saved => self.search_counterfactuals(),
+            WhyCommand::CancelSaved => {
                 if let Some(key) = self.step_key(self.cursor.step) {
                     self.call_question::<CancelCounterfactual>(key, false);
                 }
             }
-            Ask::Try(what_if) => self.try_out(what_if),
-            Ask::Change { key, value } => {
+            WhyCommand::Try(what_if) => self.try_out(what_if),
+            WhyCommand::Change { key, value } => {
                 let mut what_if = self.trial().map(|trial| trial.what_if.clone()).unwrap_or_default();
                 match value {
                     Some(value) => what_if.settings.insert(key, value),
@@ -88,70 +88,70 @@ impl State {
                 };
                 self.try_out(what_if);
             }
-            Ask::Displace(pixel) => {
+            WhyCommand::Displace(pixel) => {
                 let what_if = self.trial().map(|trial| trial.what_if.clone()).unwrap_or_default();
                 self.try_out(WhatIf { prediction_px: pixel, ..what_if });
             }
-            Ask::Scores(shown) => self.why.scores_shown = shown,
-            Ask::Discard => self.try_out(WhatIf::default()),
-            Ask::Branch => {
+            WhyCommand::Scores(shown) => self.why.scores_shown = shown,
+            WhyCommand::Discard => self.try_out(WhatIf::default()),
+            WhyCommand::Branch => {
                 if let Some(what_if) = self.trial().map(|trial| trial.what_if.clone()) {
                     self.branch(&what_if);
                 }
             }
-            Ask::BranchWith(what_if) => self.branch(&what_if),
-            Ask::RemoveRun { target, run } => self.remove_run(target, run),
-            Ask::Undo => self.undo_last(),
-            Ask::Redo => self.redo_last(),
+            WhyCommand::BranchWith(what_if) => self.branch(&what_if),
+            WhyCommand::RemoveRun { target, run } => self.remove_run(target, run),
+            WhyCommand::Undo => self.undo_last(),
+            WhyCommand::Redo => self.redo_last(),
         }
     }
 
-    fn ask_value(&mut self, step: usize, value: String) {
+    fn explain_value(&mut self, step: usize, value: String) {
         self.outbox.add(Effect::reveal(Pane::Why));
         let Some(key) = self.step_key(step) else { return };
         self.why.followed = self.step_key(self.cursor.step);
-        self.want_tree(&key, &value);
+        self.request_explanation(&key, &value);
         let place = (key, value);
-        if self.why.asked.last() != Some(&place) {
-            self.why.asked.push(place);
+        if self.why.history.last() != Some(&place) {
+            self.why.history.push(place);
         }
-        if self.why.asked.len() > REMEMBERED {
-            self.why.asked.remove(0);
+        if self.why.history.len() > REMEMBERED {
+            self.why.history.remove(0);
         }
     }
 
-    pub(crate) fn want_tree(&mut self, key: &StepKey, value: &str) {
+    pub(crate) fn request_explanation(&mut self, key: &StepKey, value: &str) {
         let place = (key.clone(), value.to_owned());
-        if matches!(self.why.trees.get(&place), Some(Told::Waiting | Told::Here(_))) {
+        if matches!(self.why.trees.get(&place), Some(Remote::Pending | Remote::Received(_))) {
             return;
         }
         if self.why.trees.len() >= KEPT {
             self.why.trees.pop_first();
         }
-        self.why.trees.insert(place.clone(), Told::Waiting);
+        self.why.trees.insert(place.clone(), Remote::Pending);
         let call = Call::with_query::<ShowWhy>(key, &ValueName { value: Some(value.to_owned()) });
         self.call_with_problem::<ShowWhy>(call, move |state, outcome| {
-            let told = outcome.map_or_else(|problem| Told::Refused(problem.detail), Told::Here);
-            state.why.trees.insert(place, told);
+            let remote = outcome.map_or_else(|problem| Remote::Refused(problem.detail), Remote::Received);
+            state.why.trees.insert(place, remote);
         });
     }
 
-    /// Shows the card of this step and explains the last explained value where this step has it; else the gate with the
-    /// smallest margin, else the state.
-    fn ask_selected(&mut self) {
-        self.why.in_view.ask(Part::Card);
-        let last = self.why.asked.last().map(|(_, value)| value.clone());
+    /// Shows the card of this step, and explains the last explained value if this step has it; otherwise the gate with the
+    /// smallest margin, otherwise the state.
+    fn explain_selected(&mut self) {
+        self.why.scroll_request.request(WhySection::Card);
+        let last = self.why.history.last().map(|(_, value)| value.clone());
         let last = last.filter(|value| self.has_value(value));
         let worst = || {
             let verdict = self.trace()?.verdict()?;
             gates::by_margin(&verdict.gates).first().map(|margin| format!("gate.{}", margin.gate.name))
         };
         let value = last.or_else(worst).unwrap_or_else(|| "state".to_owned());
-        self.ask_value(self.cursor.step, value);
+        self.explain_value(self.cursor.step, value);
     }
 
-    fn ask_what_saves(&mut self) {
-        self.why.in_view.ask(Part::Saved);
+    fn search_counterfactuals(&mut self) {
+        self.why.scroll_request.request(WhySection::Saved);
         self.outbox.add(Effect::reveal(Pane::Why));
         let Some(key) = self.step_key(self.cursor.step).filter(|_| self.row().is_some()) else {
             let missing = self.missing_step();
@@ -163,8 +163,8 @@ impl State {
             return;
         }
         let goes_on = match self.why.questions.get(&key) {
-            Some(Told::Waiting) => true,
-            Some(Told::Here(question)) => {
+            Some(Remote::Pending) => true,
+            Some(Remote::Received(question)) => {
                 matches!(
                     question.state,
                     QuestionState::Waiting | QuestionState::Running | QuestionState::Done
@@ -173,7 +173,7 @@ impl State {
             _ => false,
         };
         if !goes_on {
-            self.why.questions.insert(key.clone(), Told::Waiting);
+            self.why.questions.insert(key.clone(), Remote::Pending);
             self.call_question::<AskCounterfactual>(key, true);
         }
     }
@@ -198,43 +198,46 @@ impl State {
     {
         self.call_with_problem::<E>(Call::to::<E>(&key), move |state, outcome| match outcome {
             Ok(question) if question.state != QuestionState::Unasked => {
-                state.why.questions.insert(key, Told::Here(question));
+                state.why.questions.insert(key, Remote::Received(question));
             }
             Err(problem) if is_refusal_shown => {
-                state.why.questions.insert(key, Told::Refused(problem.detail));
+                state.why.questions.insert(key, Remote::Refused(problem.detail));
             }
-            // Not asked yet, or ended meanwhile.
+            // Not asked before, or finished meanwhile.
             _ => {}
         });
     }
 
-    /// Reads how far a question is answered.
+    /// Reads the progress of a counterfactual search.
     fn read_question(&mut self, key: StepKey) {
         self.call_question::<ShowCounterfactual>(key, false);
     }
 
-    /// Reads a question again after an event about it.
-    pub(crate) fn question_went_on(&mut self, key: StepKey) {
+    /// Reads a search again after an event about it.
+    pub(crate) fn on_question_progress(&mut self, key: StepKey) {
         if self.session.as_ref().is_some_and(|session| session.id == key.session) {
             self.read_question(key);
         }
     }
 
-    /// Reads the unanswered questions again: the page may have missed events about them.
+    /// Reads the unfinished searches again: the page may have missed events about them.
     pub(crate) fn follow_questions(&mut self) {
-        let is_open =
-            |told: &Told<Question>| matches!(told, Told::Here(question) if !question.state.is_over());
-        let open = self.why.questions.iter().filter(|(_, told)| is_open(told)).map(|(key, _)| key.clone());
+        let is_open = |remote: &Remote<Question>| match remote {
+            Remote::Received(question) => !question.state.is_over(),
+            Remote::Pending | Remote::Refused(_) => false,
+        };
+        let open =
+            self.why.questions.iter().filter(|(_, remote)| is_open(remote)).map(|(key, _)| key.clone());
         for key in open.collect::<Vec<_>>() {
             self.read_question(key);
         }
     }
 
-    /// Reads once whether the question about the cursor's step was asked before: a reloaded page finds its answer.
-    pub fn want_question(&mut self) {
+    /// Reads once whether counterfactuals of the cursor's step already exist, so that a reloaded page finds them.
+    pub fn read_question_once(&mut self) {
         let is_lost = self.row().is_some_and(|row| row.state != "tracking" || row.tracked == Some(false));
         let Some(key) = self.step_key(self.cursor.step).filter(|_| is_lost) else { return };
-        if self.why.looked_for.insert(key.clone()) {
+        if self.why.checked_questions.insert(key.clone()) {
             self.read_question(key);
         }
     }

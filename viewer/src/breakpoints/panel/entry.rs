@@ -1,4 +1,4 @@
-//! The expression box: completion as one writes, what the expression is, and what is wrong with it at its place.
+//! The expression box: completion, the type of the expression, and errors marked at their position.
 
 use egui::text::LayoutJob;
 use egui::{
@@ -8,31 +8,31 @@ use egui::{
 use sightline_session::expression::complete::complete;
 use sightline_session::expression::{Answers, Expression, LENGTH_LIMIT, Refused};
 
-use crate::breakpoints::Ask;
+use crate::breakpoints::BreakpointCommand;
 use crate::command::Command;
 use crate::state::State;
 use crate::theme;
 
-/// What the box is called by who cannot see it.
+/// The accessible name of the box.
 const NAME: &str = "expression";
 
-/// How many letters a suggestion and its meaning have together: more would break the name in the narrowest panel.
+/// Maximum length of a suggestion with its meaning, characters; longer ones would wrap in the narrowest panel.
 const SUGGESTION_LETTERS: usize = 42;
 
-/// What may be part of a name: everything else ends the word that is completed.
+/// Whether a character ends the word to complete; all characters of names continue it.
 fn ends_word(c: char) -> bool {
     !(c.is_ascii_alphanumeric() || matches!(c, '_' | '.' | '[' | ']'))
 }
 
-/// Shows the box with its buttons, and below it what the expression is or what is wrong.
+/// Shows the box with its buttons, and below it the type of the expression or its error.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
-    let before = state.ask.text.as_str();
+    let before = state.breakpoints.text.as_str();
     let mut text = before.to_owned();
     let read = Expression::read(before);
     let id = Id::unique("expression box");
     one_tab_a_frame(ui, id);
     let is_entered = ui.input(|input| input.key_pressed(Key::Enter));
-    // A whole expression is set by Enter; only an unfinished one takes the suggestion by it.
+    // Enter sets a complete expression; for an incomplete one, it accepts the suggestion.
     let is_whole = Expression::read(&with_typed(ui, before)).is_ok();
     let keys = if is_whole { vec![Key::Tab] } else { vec![Key::Tab, Key::Enter] };
     let field = TextEdit::singleline(&mut text)
@@ -44,21 +44,21 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         CompletionPopup::new(id).word_boundary(ends_word).align(RectAlign::BOTTOM_START).accept_keys(keys);
     let shown = popup.show(ui, field, |query| suggestions(query.text, query.word_range.end.0));
     let response = shown.text_edit.response.response.accessible_name(NAME);
-    if state.ask.wants_focus && !response.has_focus() {
+    if state.breakpoints.wants_focus && !response.has_focus() {
         response.request_focus();
     }
     let had_focus = response.has_focus() || response.lost_focus();
-    if state.ask.wants_focus || text != before {
-        out.push(Command::Ask(Ask::Type(text.clone())));
+    if state.breakpoints.wants_focus || text != before {
+        out.push(Command::Breakpoints(BreakpointCommand::Type(text.clone())));
     }
     if is_entered && had_focus && shown.accepted.is_none() {
-        // What cannot be set is to be mended, not left.
+        // An invalid expression keeps the focus, to be corrected.
         if Expression::condition(&text).is_err() {
             response.request_focus();
         } else {
             response.surrender_focus();
         }
-        out.push(Command::Ask(Ask::Set));
+        out.push(Command::Breakpoints(BreakpointCommand::Set));
     }
     buttons(ui, state, &read, out);
     if !before.trim().is_empty() {
@@ -66,8 +66,8 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     }
 }
 
-/// Keeps what was typed behind Tab for the next frame: Tab takes the suggestion for what stood there when it was pressed, and
-/// who types fast sends it together with the next letters.
+/// Delays the events after Tab to the next frame. Tab accepts the suggestion for the text at that moment, and a fast typist
+/// sends the following letters in the same frame.
 fn one_tab_a_frame(ui: &Ui, field: Id) {
     let id = field.with("held back");
     let held = ui.data_mut(|data| data.remove_temp::<Vec<Event>>(id)).unwrap_or_default();
@@ -88,7 +88,7 @@ fn one_tab_a_frame(ui: &Ui, field: Id) {
     }
 }
 
-/// The text with the letters of this frame at its end: who types fast sends the last ones together with Enter.
+/// The text followed by the letters of this frame, because a fast typist sends the last letters together with Enter.
 fn with_typed(ui: &Ui, before: &str) -> String {
     let typed = ui.input(|input| {
         let texts = input.events.iter().filter_map(|event| match event {
@@ -100,7 +100,7 @@ fn with_typed(ui: &Ui, before: &str) -> String {
     before.to_owned() + &typed
 }
 
-/// What could be written at the cursor.
+/// The completions at the cursor.
 fn suggestions(text: &str, cursor: usize) -> Vec<Suggestion> {
     if text.trim().is_empty() {
         return Vec::new();
@@ -114,42 +114,43 @@ fn suggestions(text: &str, cursor: usize) -> Vec<Suggestion> {
     complete(text, cursor).candidates.into_iter().map(suggest).collect()
 }
 
-/// A text cut to so many letters, with a sign that it was.
+/// A text shortened to this many letters, with an ellipsis if it was cut.
 fn shortened(text: &str, letters: usize) -> String {
     if text.chars().count() <= letters {
         return text.to_owned();
     }
-    let kept: String = text.chars().take(letters.saturating_sub(2)).collect();
-    kept.trim_end().to_owned() + " …"
+    let shortened: String = text.chars().take(letters.saturating_sub(2)).collect();
+    shortened.trim_end().to_owned() + " …"
 }
 
 fn buttons(ui: &mut Ui, state: &State, read: &Result<Expression, Refused>, out: &mut Vec<Command>) {
     let answers = read.as_ref().ok().map(Expression::answers);
     ui.horizontal_wrapped(|ui| {
-        let words = if state.ask.edited.is_some() { "Change the condition" } else { "Break when true" };
+        let words =
+            if state.breakpoints.edited.is_some() { "Change the condition" } else { "Break when true" };
         let set = ui
             .add_enabled(answers == Some(Answers::Truth), Button::new(words).min_size(egui::vec2(0.0, 24.0)));
         if set.on_hover_text("at every step of every run (Enter)").clicked() {
-            out.push(Command::Ask(Ask::Set));
+            out.push(Command::Breakpoints(BreakpointCommand::Set));
         }
         let can_plot = matches!(answers, Some(Answers::Truth | Answers::Number));
         let plot =
             ui.add_enabled(can_plot, Button::new("Plot over the steps").min_size(egui::vec2(0.0, 24.0)));
         if plot.on_hover_text("in the panel Over the steps; the run is not computed again").clicked() {
-            out.push(Command::Ask(Ask::Plot(state.ask.text.clone())));
+            out.push(Command::Breakpoints(BreakpointCommand::Plot(state.breakpoints.text.clone())));
         }
-        if state.ask.edited.is_some() && ui.button("Leave it").clicked() {
-            out.push(Command::Ask(Ask::CancelEdit));
+        if state.breakpoints.edited.is_some() && ui.button("Leave it").clicked() {
+            out.push(Command::Breakpoints(BreakpointCommand::CancelEdit));
         }
         let step = state.cursor.step;
         if state.stop_count() > 0 && ui.button(format!("Break at step {step}")).on_hover_text("(B)").clicked()
         {
-            out.push(Command::Ask(Ask::BreakAt(step)));
+            out.push(Command::Breakpoints(BreakpointCommand::BreakAt(step)));
         }
     });
 }
 
-/// What the expression is, or what is wrong with it and where.
+/// Shows the type of the expression, or its error with its position.
 fn verdict(ui: &mut Ui, text: &str, read: &Result<Expression, Refused>) {
     match read {
         Ok(read) => {
@@ -174,7 +175,7 @@ fn verdict(ui: &mut Ui, text: &str, read: &Result<Expression, Refused>) {
     }
 }
 
-/// The text with the characters at fault underlined; a place after its end is a mark of its own.
+/// The text with the error underlined; an error at the end is marked by an extra character.
 fn marked(text: &str, refused: &Refused) -> LayoutJob {
     let font = FontId::new(12.5, FontFamily::Monospace);
     let plain = TextFormat::simple(font.clone(), theme::weak());

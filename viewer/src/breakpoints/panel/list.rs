@@ -3,13 +3,13 @@
 use egui::{Button, Color32, RichText, Sense, Ui, vec2};
 use sightline_session::breakpoints::BreakpointView;
 
-use crate::breakpoints::{Ask, Asking};
+use crate::breakpoints::{BreakpointCommand, BreakpointState};
 use crate::command::{Command, Go};
 use crate::drawing::overlay::{Mark, paint_mark};
 use crate::state::{State, run_letter};
 use crate::theme;
 
-/// The mark of a breakpoint by its place in the list: shape and colour, the same on the timeline.
+/// Shape and colour of a breakpoint by its index in the list, here and on the timeline.
 pub(crate) fn mark(at: usize) -> (Mark, Color32) {
     let shapes = [Mark::Diamond, Mark::Square, Mark::Ring, Mark::Cross, Mark::Plus];
     (shapes[at % shapes.len()], theme::breakpoint(at))
@@ -17,7 +17,7 @@ pub(crate) fn mark(at: usize) -> (Mark, Color32) {
 
 /// Shows the list.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
-    let list = &state.ask.breakpoints;
+    let list = &state.breakpoints.list;
     if list.is_empty() {
         let words = "No breakpoints yet. Write a condition above, press B to break at this step, or click above the timeline.";
         ui.add(egui::Label::new(theme::note(words)).wrap());
@@ -27,35 +27,36 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     for (at, breakpoint) in list.iter().enumerate() {
         show_one(ui, state, at, breakpoint, out);
     }
-    if !state.ask.derived.is_empty() {
+    if !state.breakpoints.derived.is_empty() {
         ui.add_space(6.0);
         ui.label(theme::title("Plotted"));
     }
-    for (at, derived) in state.ask.derived.iter().enumerate() {
+    for (at, derived) in state.breakpoints.derived.iter().enumerate() {
         ui.horizontal(|ui| {
             ui.label(RichText::new(&derived.expression).monospace());
             let unit = derived.answer.as_ref().map_or("", |answer| answer.unit.as_str());
             ui.label(theme::note(unit));
             let remove = ui.small_button("Remove plot");
             if remove.accessible_name(format!("remove plot {} from the list", derived.expression)).clicked() {
-                out.push(Command::Ask(Ask::Unplot(at)));
+                out.push(Command::Breakpoints(BreakpointCommand::Unplot(at)));
             }
         });
     }
 }
 
-/// Hits in the run that is looked at, and the ways to the neighbouring ones.
+/// Shows the number of hits in all runs, and buttons to the previous and the next hit in the selected run.
 fn summary(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ui.horizontal_wrapped(|ui| {
-        let count: usize = state.ask.watched().map(|(_, breakpoint)| breakpoint.count).sum();
+        let count: usize = state.breakpoints.watched().map(|(_, breakpoint)| breakpoint.count).sum();
         ui.label(theme::note(format!("{count} hits in all runs")));
-        for (words, is_forward, ask) in
-            [("Previous hit", false, Ask::PreviousHit), ("Next hit", true, Ask::NextHit)]
-        {
+        for (words, is_forward, command) in [
+            ("Previous hit", false, BreakpointCommand::PreviousHit),
+            ("Next hit", true, BreakpointCommand::NextHit),
+        ] {
             let is_there = state.hit_from(state.cursor.step, is_forward).is_some();
             let button = ui.add_enabled(is_there, Button::new(words).min_size(vec2(0.0, 24.0)));
             if button.on_hover_text(if is_forward { "(N)" } else { "(Shift+N)" }).clicked() {
-                out.push(Command::Ask(ask));
+                out.push(Command::Breakpoints(command));
             }
         }
     });
@@ -71,7 +72,7 @@ fn show_one(ui: &mut Ui, state: &State, at: usize, breakpoint: &BreakpointView, 
         let mut is_on = *on;
         let check = ui.checkbox(&mut is_on, RichText::new(expression).monospace());
         if check.on_hover_text("whether it is looked for").changed() {
-            out.push(Command::Ask(Ask::Switch { number: *number, on: is_on }));
+            out.push(Command::Breakpoints(BreakpointCommand::Switch { number: *number, on: is_on }));
         }
         let words = match (on, &breakpoint.problem) {
             (_, Some(problem)) => format!("cannot be read any more: {problem}"),
@@ -81,18 +82,20 @@ fn show_one(ui: &mut Ui, state: &State, at: usize, breakpoint: &BreakpointView, 
         let is_bad = breakpoint.problem.is_some();
         ui.label(theme::note(words).color(if is_bad { theme::lost() } else { theme::weak() }));
         if ui.small_button("Edit").accessible_name(format!("edit breakpoint {expression}")).clicked() {
-            out.push(Command::Ask(Ask::Edit(*number)));
+            out.push(Command::Breakpoints(BreakpointCommand::Edit(*number)));
         }
         if ui.small_button("Remove").accessible_name(format!("remove breakpoint {expression}")).clicked() {
-            out.push(Command::Ask(Ask::Remove(*number)));
+            out.push(Command::Breakpoints(BreakpointCommand::Remove(*number)));
         }
     });
     other_runs(ui, state, breakpoint, out);
 }
 
 fn hits_in_words(state: &State, breakpoint: &BreakpointView, count: usize) -> String {
-    let here =
-        state.cursor.target.map_or(0, |target| Asking::hits(breakpoint, target, state.cursor.run).len());
+    let here = state
+        .cursor
+        .target
+        .map_or(0, |target| BreakpointState::hits(breakpoint, target, state.cursor.run).len());
     match (count, here) {
         (0, _) => "no hits".to_owned(),
         (1, 1) => "1 hit".to_owned(),
@@ -102,7 +105,7 @@ fn hits_in_words(state: &State, breakpoint: &BreakpointView, count: usize) -> St
     }
 }
 
-/// A way to the first hit in each other run.
+/// Shows links to the first hit in each other run.
 fn other_runs(ui: &mut Ui, state: &State, breakpoint: &BreakpointView, out: &mut Vec<Command>) {
     let is_here = |target: usize, run: usize| state.cursor.target == Some(target) && state.cursor.run == run;
     let others = breakpoint.hits.iter().filter(|hits| breakpoint.on && !is_here(hits.target, hits.run));
@@ -119,7 +122,7 @@ fn other_runs(ui: &mut Ui, state: &State, breakpoint: &BreakpointView, out: &mut
             let label = target.map_or_else(|| format!("target {}", hits.target + 1), |t| t.label.clone());
             let words = format!("{label} {}: {}", run_letter(hits.run), hits.steps.len());
             if ui.small_button(words).on_hover_text(format!("go to its first hit, step {first}")).clicked() {
-                out.push(Command::Look { target: hits.target, run: hits.run });
+                out.push(Command::SelectRun { target: hits.target, run: hits.run });
                 out.push(Command::Go(Go::Step(*first)));
             }
         }

@@ -1,4 +1,4 @@
-//! The breakpoints: the box in which expressions are written, and the list with what each hits.
+//! The panel “Breakpoints”: the expression box, and the list of breakpoints with their hits.
 
 mod entry;
 mod list;
@@ -7,7 +7,7 @@ use egui::{Response, ScrollArea, Ui};
 use sightline_session::expression::{Answers, Expression};
 
 pub(crate) use self::list::mark;
-use crate::breakpoints::Ask;
+use crate::breakpoints::BreakpointCommand;
 use crate::command::Command;
 use crate::panels::panel::Panel;
 use crate::state::State;
@@ -34,7 +34,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     });
 }
 
-/// The menu of plotted values: conditions that begin with what is looked at.
+/// The context menu of plotted values: proposes conditions about them.
 pub(crate) fn menu(response: &Response, plotted: &[(&str, f64)], out: &mut Vec<Command>) {
     if plotted.is_empty() {
         return;
@@ -42,14 +42,14 @@ pub(crate) fn menu(response: &Response, plotted: &[(&str, f64)], out: &mut Vec<C
     response.context_menu(|ui| {
         for text in plotted.iter().flat_map(|(expression, value)| proposals(expression, *value)) {
             if ui.button(format!("Break when {text}")).clicked() {
-                out.push(Command::Ask(Ask::Propose(text)));
+                out.push(Command::Breakpoints(BreakpointCommand::Propose(text)));
                 ui.close();
             }
         }
     });
 }
 
-/// Conditions that begin with the value of an expression.
+/// Proposed conditions about an expression with this value.
 fn proposals(expression: &str, value: f64) -> Vec<String> {
     let changes = format!("changes({expression})");
     if Expression::read(expression).is_ok_and(|read| read.answers() == Answers::Number) {
@@ -60,13 +60,13 @@ fn proposals(expression: &str, value: f64) -> Vec<String> {
     }
 }
 
-/// An expression that a comparison can follow.
+/// The expression in a form that a comparison can follow: in parentheses if necessary.
 fn in_parentheses(expression: &str) -> String {
     let is_plain = expression.chars().all(|c| c.is_ascii_alphanumeric() || "_.[]()".contains(c));
     if is_plain { expression.to_owned() } else { format!("({expression})") }
 }
 
-/// A value with three digits, as the language writes it.
+/// A value rounded to three significant digits, in the syntax of expressions.
 fn short(value: f64) -> String {
     let scale = 10_f64.powf(2.0 - value.abs().max(1e-12).log10().floor());
     let rounded = (value * scale).round() / scale;
@@ -78,7 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_proposed_can_be_read() {
+    fn proposed_conditions_parse() {
         for (expression, value) in
             [("ncc", 0.83456), ("sigma_m * 100", 1e-7), ("prev(err_px)", -412.77), ("step", 0.0)]
         {

@@ -1,18 +1,18 @@
-//! The row above the left image while runs are compared: how, which stops belong together, and where they differ first.
+//! The bar above the left image while runs are compared: the view, the alignment of stops, and the first divergence.
 
 use egui::{Button, ComboBox, RichText, Ui, vec2};
 use sightline_session::compare::Alignment;
 
 use crate::command::Command;
-use crate::compare::{Ask, Closeness, View};
+use crate::compare::{CompareCommand, ToleranceLevel, View};
 use crate::state::State;
 use crate::{figure, panels, theme};
 
-/// Shows the row, where runs are compared or the target is held still.
+/// Shows the bar if runs are compared, the target is stabilised, or the previous step is overlaid.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let compare = &state.compare;
     let is_comparing = state.is_comparing();
-    if figure::is_on_paper() || !is_comparing && !compare.is_held && !compare.has_onion_skin {
+    if figure::is_on_paper() || !is_comparing && !compare.is_stabilised && !compare.has_onion_skin {
         return;
     }
     ui.horizontal(|ui| {
@@ -20,7 +20,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         if is_comparing {
             let all = View::ALL.map(|view| (view, view.word(), view.help()));
             choice(ui, ("compare by", "view"), compare.view.word(), all, compare.view, |view| {
-                out.push(Command::Compare(Ask::View(view)));
+                out.push(Command::Compare(CompareCommand::View(view)));
             });
             options(ui, state, out);
             divergence(ui, state, out);
@@ -30,7 +30,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     });
 }
 
-/// What is rarely changed: which stops belong together, which differences count, and what the image does.
+/// The rarely used options: alignment of the stops, tolerance, and behaviour of the image.
 fn options(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let compare = &state.compare;
     let button = Button::new(RichText::new("Options").size(11.5)).min_size(vec2(0.0, 24.0));
@@ -40,14 +40,14 @@ fn options(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             let entry =
                 panels::entry(ui, align == compare.align, align.word()).on_hover_text(align.sentence());
             if entry.accessible_name(format!("align by {}", align.word())).clicked() {
-                out.push(Command::Compare(Ask::Align(align)));
+                out.push(Command::Compare(CompareCommand::Align(align)));
             }
         }
         ui.label(theme::note("ignore differences below"));
-        for close in Closeness::ALL {
-            let entry = panels::entry(ui, close == compare.closeness, close.word());
+        for close in ToleranceLevel::ALL {
+            let entry = panels::entry(ui, close == compare.tolerance, close.word());
             if entry.accessible_name(format!("ignore below {}", close.word())).clicked() {
-                out.push(Command::Compare(Ask::Closeness(close)));
+                out.push(Command::Compare(CompareCommand::Tolerance(close)));
             }
         }
         ui.separator();
@@ -56,29 +56,34 @@ fn options(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     menu.0.accessible_name("compare options").on_hover_text(format!(
         "Stops aligned by {}; differences ignored below: {}",
         compare.align.word(),
-        compare.closeness.word()
+        compare.tolerance.word()
     ));
 }
 
 fn switches(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let compare = &state.compare;
-    for (words, help, is_on, ask) in [
-        ("hold target", "The target stays still and its drift shows (S)", compare.is_held, Ask::Stabilise),
+    for (words, help, is_on, command) in [
+        (
+            "hold target",
+            "The target stays still and its drift shows (S)",
+            compare.is_stabilised,
+            CompareCommand::Stabilise,
+        ),
         (
             "overlay previous step",
             "The previous step shines through (onion skin)",
             compare.has_onion_skin,
-            Ask::OnionSkin,
+            CompareCommand::OnionSkin,
         ),
     ] {
         let mut is_on = is_on;
         if ui.checkbox(&mut is_on, RichText::new(words).size(11.5)).on_hover_text(help).changed() {
-            out.push(Command::Compare(ask));
+            out.push(Command::Compare(command));
         }
     }
 }
 
-/// A box to choose from, with what it is about before it.
+/// A labelled combo box.
 fn choice<T: Copy + PartialEq, const N: usize>(
     ui: &mut Ui,
     (name, salt): (&str, &str),
@@ -99,18 +104,18 @@ fn choice<T: Copy + PartialEq, const N: usize>(
     shown.response.accessible_name(format!("{name}: {word}"));
 }
 
-/// The sentence of the first divergence, and the way there.
+/// Shows the sentence of the first divergence, and the button that goes there.
 fn divergence(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let button = Button::new(RichText::new("First divergence (D)").size(11.5)).min_size(vec2(0.0, 24.0));
     if ui.add(button).on_hover_text("Goes to the step and the stage at which the runs differ first").clicked()
     {
-        out.push(Command::Compare(Ask::FirstDivergence));
+        out.push(Command::Compare(CompareCommand::FirstDivergence));
     }
     let label = egui::Label::new(RichText::new(sentence(state)).size(11.5).color(theme::text())).truncate();
     ui.add(label);
 }
 
-/// Where this run and each other one differ first.
+/// The first divergence between the selected run and each compared one, as sentences.
 pub(crate) fn sentence(state: &State) -> String {
     if let Some(problem) = state.comparison_problem() {
         return problem.to_owned();

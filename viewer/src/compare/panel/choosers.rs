@@ -1,27 +1,27 @@
-//! In the top bar: which run is looked at, and with which ones it is compared.
+//! Combo boxes in the top bar: the selected run, and the runs that it is compared with.
 
 use egui::{ComboBox, RichText, Ui};
 use sightline_session::compare::{RUNS_MAX, RunName};
 
 use crate::command::Command;
-use crate::compare::Ask;
+use crate::compare::CompareCommand;
 use crate::compare::panel::mark;
 use crate::panels;
 use crate::state::State;
 use crate::theme;
 
-/// What the choosers are called.
+/// Accessible names of the combo boxes.
 const NAMES: [&str; RUNS_MAX] =
     ["run looked at", "compared with", "third run compared", "fourth run compared"];
 
-/// Shows the choosers, where there is a run.
+/// Shows the combo boxes, if a run is selected.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let Some(own) = state.own_name() else { return };
     ui.spacing_mut().item_spacing.x = 4.0;
-    mark(ui, state.own_look());
+    mark(ui, state.own_style());
     chooser(ui, state, 0, Some(own), |ui, label, name| {
         if panels::entry(ui, name == own, label).clicked() {
-            out.push(Command::Look { target: name.target, run: name.run });
+            out.push(Command::SelectRun { target: name.target, run: name.run });
         }
     });
     ui.label(theme::label("vs"));
@@ -32,30 +32,30 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         button.accessible_name("compared with none").on_disabled_hover_text(why);
         return;
     }
-    // One more place than is taken, so that there is always one to add.
+    // One more box than there are compared runs, so that another can be added.
     let places = (others.len() + 1).min(RUNS_MAX - 1);
     for place in 0..places {
         let chosen = others.get(place);
         if let Some(other) = chosen {
-            mark(ui, other.look);
+            mark(ui, other.style);
         }
         let present = chosen.map(|other| other.name);
-        let mut asked = None;
+        let mut selection = None;
         chooser(ui, state, place + 1, present, |ui, label, name| {
             if name != own && panels::entry(ui, present == Some(name), label).clicked() {
-                asked = Some(Some(name));
+                selection = Some(Some(name));
             }
         });
         if present.is_some()
             && ui.small_button("×").accessible_name(format!("take {} out", NAMES[place + 1])).clicked()
         {
-            asked = Some(None);
+            selection = Some(None);
         }
-        if let Some(run) = asked {
-            // A place is one of the runs that exist, which need not be all that are remembered.
+        if let Some(run) = selection {
+            // The box shows an existing run; its index among the stored runs may differ.
             let place = present.and_then(|name| state.compare.others.iter().position(|&other| other == name));
             let place = place.unwrap_or(state.compare.others.len());
-            out.push(Command::Compare(Ask::With { place, run }));
+            out.push(Command::Compare(CompareCommand::With { place, run }));
         }
     }
 }

@@ -1,7 +1,7 @@
-//! What two runs matched and searched for: the patches of both, and the signed difference of them.
+//! The warped templates and the matched patches of two runs, and their signed difference.
 //!
-//! Both are brought to mean 0 and deviation 1 over the pixels that both have, as correlation sees them (K-Eq 11), and
-//! subtracted; patches of different size are cut to what they share about their centres.
+//! Both patches are normalised to mean 0 and standard deviation 1 over their common pixels, as correlation does (K-Eq 11),
+//! and subtracted. Patches of different sizes are cropped about their centres to the common size.
 
 use egui::{Color32, Mesh, Rect, Ui, pos2, vec2};
 use sightline_track::trace::ArrayName;
@@ -13,33 +13,33 @@ use crate::panels;
 use crate::state::State;
 use crate::theme;
 
-/// What is compared, with what it is called.
+/// The compared patches, with their labels.
 const PATCHES: [(ArrayName, &str); 2] =
     [(ArrayName::ROLLED, "warped template"), (ArrayName::MATCHED, "matched patch")];
 
-/// What is needed to fill the panel.
+/// Shown while the panel is empty.
 const PURPOSE: &str = "Difference of the two runs: warped template and matched patch.";
 
-/// Room for the words above a patch, points.
+/// Height of the words above a patch, points.
 const WORDS: f32 = 16.0;
 
-/// Two patches as correlation sees them.
+/// Two normalised patches.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Patches {
-    /// Width and height of what both have.
+    /// Width and height of the common area, px.
     pub size: [u32; 2],
-    /// The first, with mean 0 and deviation 1; NaN where either has no value.
+    /// The first patch, with mean 0 and standard deviation 1; NaN where either patch has no value.
     pub first: Vec<f32>,
-    /// The other one alike.
+    /// The other patch, in the same form.
     pub other: Vec<f32>,
-    /// Their correlation.
+    /// Zero-mean normalised correlation of the two patches, from −1 to 1.
     pub correlation: f32,
-    /// Whether one of them was larger.
+    /// Whether a larger patch was cropped.
     pub is_cut: bool,
 }
 
 impl Patches {
-    /// The two patches over the pixels that both have; none where they share no contrast.
+    /// Normalises two patches over their common pixels; `None` if either has no contrast there.
     pub(crate) fn of(first: &GrayImage, other: &GrayImage) -> Option<Self> {
         let size = [first.width().min(other.width()), first.height().min(other.height())];
         let middle = |image: &GrayImage| -> Vec<f32> {
@@ -61,12 +61,12 @@ impl Patches {
         Some(Self { size, first: a, other: b, correlation, is_cut })
     }
 
-    /// The first less the other, standard deviations.
+    /// First minus other, in standard deviations.
     pub(crate) fn difference(&self) -> Vec<f32> {
         self.first.iter().zip(&self.other).map(|(a, b)| a - b).collect()
     }
 
-    /// Column, row and value of the largest difference.
+    /// Column, row and value of the difference with the largest magnitude.
     pub(crate) fn largest(&self) -> Option<(usize, usize, f32)> {
         let width = self.size[0] as usize;
         let values = self.difference().into_iter().enumerate().filter(|(_, value)| !value.is_nan());
@@ -75,7 +75,7 @@ impl Patches {
     }
 }
 
-/// Brings values to mean 0 and deviation 1; none where they have no contrast.
+/// Normalises values to mean 0 and standard deviation 1; `None` without contrast.
 fn normalise(values: &mut [f32]) -> Option<()> {
     let there: Vec<f64> = values.iter().filter(|v| !v.is_nan()).map(|&v| f64::from(v)).collect();
     let mean = there.iter().sum::<f64>() / there.len() as f64;
@@ -87,7 +87,7 @@ fn normalise(values: &mut [f32]) -> Option<()> {
     Some(())
 }
 
-/// Shows the patches of this run and the first compared one.
+/// Shows the patches of the selected run and of the first compared one.
 pub(crate) fn show(ui: &mut Ui, state: &State) {
     let others = state.others();
     let Some(other) = others.first() else {
@@ -117,10 +117,10 @@ pub(crate) fn show(ui: &mut Ui, state: &State) {
     ui.advance_cursor_after_rect(area);
 }
 
-/// A column of a row: its words, its values and how they are coloured.
+/// A column of a row: its words, its values and their colour map.
 type Column<'a> = (String, &'a [f32], &'a dyn Fn(f32) -> Color32);
 
-/// Both patches, or why there are none.
+/// Both patches, or the reason why they are not shown.
 fn both(slots: [Slot<'_, Raster>; 2]) -> Result<[&Raster; 2], String> {
     let [first, other] = slots.map(|slot| match slot {
         Slot::Ready(raster) => Ok(raster),
@@ -153,7 +153,7 @@ fn show_row(ui: &mut Ui, row: Rect, title: &str, names: [&str; 2], rasters: [&Ra
     for (i, (words, values, colour)) in columns.into_iter().enumerate() {
         let corner = row.min + vec2((side + 12.0) * i as f32, WORDS);
         let frame = Rect::from_min_size(corner, vec2(side, side));
-        // A title is as wide as its patch: beside it begins the next one.
+        // A title is as wide as its patch, because the next one starts beside it.
         let above = Rect::from_min_size(frame.left_top() - vec2(0.0, WORDS), vec2(side + 8.0, WORDS));
         let title = egui::Label::new(theme::note(&words).color(theme::text())).truncate();
         ui.put(above, title.halign(egui::Align::Min)).on_hover_text(&words);
@@ -166,7 +166,7 @@ fn show_row(ui: &mut Ui, row: Rect, title: &str, names: [&str; 2], rasters: [&Ra
     ui.put(line, egui::Label::new(theme::note(words)).truncate().halign(egui::Align::Min));
 }
 
-/// What the row shows, in words.
+/// A summary of the row.
 fn summary(patches: &Patches, title: &str, [own, other]: [&str; 2]) -> String {
     let largest = patches.largest().map_or_else(String::new, |(column, row, value)| {
         format!(", largest difference {value:+.2} σ at column {column}, row {row}")
@@ -179,7 +179,7 @@ fn summary(patches: &Patches, title: &str, [own, other]: [&str; 2]) -> String {
     )
 }
 
-/// Values as coloured cells.
+/// Paints values as coloured cells.
 fn paint(ui: &Ui, frame: Rect, [width, height]: [u32; 2], values: &[f32], colour: &dyn Fn(f32) -> Color32) {
     let cell = vec2(frame.width() / width as f32, frame.height() / height as f32);
     let mut mesh = Mesh::default();

@@ -1,15 +1,15 @@
-//! The ways in which one left image shows two runs: all marks, wipe and blink, and the step before shining through.
+//! Views that show two runs in one left image (all marks, wipe, blink), and the overlay of the previous step.
 
 use egui::accesskit::{Action, ActionData};
 use egui::{CursorIcon, EventFilter, Key, Rect, Sense, Ui, pos2, vec2};
 use sightline_vision::image::PixelRect;
 
-use crate::cache::Eye;
+use crate::cache::ImageSide;
 use crate::command::{Command, Mode, Zoomable};
 use crate::compare::keys::wipe_id;
 use crate::compare::panel::{difference, marks, side_by_side};
 use crate::compare::state::{Other, place_of_target};
-use crate::compare::{Ask, View};
+use crate::compare::{CompareCommand, View};
 use crate::drawing::overlay::{Overlay, paint_words};
 use crate::drawing::raster::Raster;
 use crate::drawing::view2d::{Canvas, Transform};
@@ -17,10 +17,10 @@ use crate::layout::left_image::LeftImage;
 use crate::state::State;
 use crate::theme;
 
-/// How far a key moves the divider.
+/// Movement of the divider per key press, as a fraction of the width.
 const KEY_STEP: f32 = 0.05;
 
-/// What is shown instead of the one image, where the way of comparing asks for it.
+/// Shows the views that replace the single image; `None` for the others.
 pub(crate) fn instead(
     ui: &mut Ui,
     state: &State,
@@ -41,23 +41,24 @@ pub(crate) fn instead(
     }
 }
 
-/// Paints what lies under the marks: the step before, where it shines through.
+/// Paints the layer below the marks: the previous step, if it is overlaid.
 pub(crate) fn under(canvas: &Canvas, state: &State) {
     if !state.compare.has_onion_skin {
         return;
     }
     let Some(before) = state.cursor.step.checked_sub(1) else { return };
-    let Some(raster) = state.image_key(before, Eye::Left).and_then(|key| state.cache.raster(&key).ready())
+    let Some(raster) =
+        state.image_key(before, ImageSide::Left).and_then(|key| state.cache.raster(&key).ready())
     else {
         return;
     };
     raster.stretch(state.stretch);
     let [width, height] = raster.size();
     let mut area = canvas.transform.area(PixelRect::whole(width, height));
-    // With the target held still, its place then lies on its place now.
+    // With stabilisation, aligns the target's previous position with its current one.
     let now = state.trace_on_image().and_then(place_of_target);
     let places = state.trace_at(before).ready().and_then(place_of_target).zip(now);
-    if let Some((then, now)) = places.filter(|_| state.compare.is_held) {
+    if let Some((then, now)) = places.filter(|_| state.compare.is_stabilised) {
         area = area.translate(canvas.transform.to_screen(now) - canvas.transform.to_screen(then));
     }
     let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
@@ -71,7 +72,7 @@ pub(crate) fn under(canvas: &Canvas, state: &State) {
     );
 }
 
-/// Paints what lies over the marks of the run that is looked at.
+/// Paints the layer above the marks of the selected run.
 pub(crate) fn over(ui: &Ui, canvas: &Canvas, state: &State, out: &mut Vec<Command>) {
     let others = state.others();
     let Some(other) = others.first().filter(|_| state.mode != Mode::Pick) else { return };
@@ -88,13 +89,13 @@ pub(crate) fn over(ui: &Ui, canvas: &Canvas, state: &State, out: &mut Vec<Comman
         View::Wipe => wipe(ui, canvas, state, other, out),
         View::Blink => {
             let words = format!("hold X to see {}", state.run_label(other.name));
-            corner(canvas, canvas.transform.rect, &words, other.look.colour);
+            corner(canvas, canvas.transform.rect, &words, other.style.colour);
         }
         View::Marks | View::SideBySide | View::Difference => {}
     }
 }
 
-/// The image of another run with its marks, on a part of the canvas.
+/// Paints the image and the marks of another run on a part of the canvas.
 fn paint_other(canvas: &Canvas, state: &State, other: &Other<'_>, part: Rect) {
     let label = state.run_label(other.name);
     let Some(raster) = state.other_image(other.name).ready() else {
@@ -105,20 +106,20 @@ fn paint_other(canvas: &Canvas, state: &State, other: &Other<'_>, part: Rect) {
     let [width, height] = raster.size();
     let region = PixelRect::whole(width, height);
     let painter = canvas.painter.with_clip_rect(part.intersect(canvas.painter.clip_rect()));
-    let view = state.held_view(state.view(Zoomable::Left), trace);
+    let view = state.stabilised_view(state.view(Zoomable::Left), trace);
     let transform = Transform::new(view, region, canvas.transform.rect);
     painter.rect_filled(part, 0.0, theme::well());
     let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
     painter.image(raster.texture.id(), transform.area(region), whole, theme::UNTINTED);
     if let Some(trace) = trace.filter(|_| state.marks) {
-        marks::paint(&Overlay::new(&painter, &transform), trace, other.run, other.look, state);
+        marks::paint(&Overlay::new(&painter, &transform), trace, other.run, other.style, state);
     }
     let words = match trace {
         Some(trace) if trace.step != state.cursor.step => format!("{label}, step {}", trace.step),
         Some(_) => label,
         None => format!("{label}: this step is not loaded or not computed"),
     };
-    corner(canvas, part, &words, other.look.colour);
+    corner(canvas, part, &words, other.style.colour);
 }
 
 fn corner(canvas: &Canvas, part: Rect, words: &str, colour: egui::Color32) {
@@ -126,14 +127,14 @@ fn corner(canvas: &Canvas, part: Rect, words: &str, colour: egui::Color32) {
     paint_words(&canvas.painter, part.right_top() + vec2(-width - 8.0, 12.0), words, colour);
 }
 
-/// This run left of the divider, the other right of it.
+/// Shows the selected run left of the divider and the other right of it.
 fn wipe(ui: &Ui, canvas: &Canvas, state: &State, other: &Other<'_>, out: &mut Vec<Command>) {
     let area = canvas.transform.rect;
     let at = state.compare.wipe.unwrap_or(0.5);
     let x = area.left() + area.width() * at;
     paint_other(canvas, state, other, area.with_min_x(x));
     let own = state.own_name().map_or_else(String::new, |own| state.run_label(own));
-    paint_words(&canvas.painter, area.left_top() + vec2(8.0, 12.0), &own, state.own_look().colour);
+    paint_words(&canvas.painter, area.left_top() + vec2(8.0, 12.0), &own, state.own_style().colour);
     let grip = Rect::from_center_size(pos2(x, area.center().y), vec2(24.0, area.height()));
     let response = ui.interact(grip.intersect(area), wipe_id(), Sense::click_and_drag());
     let is_marked = response.hovered() || response.has_focus() || response.dragged();
@@ -151,24 +152,24 @@ fn wipe(ui: &Ui, canvas: &Canvas, state: &State, other: &Other<'_>, out: &mut Ve
         }
         node.set_min_numeric_value(0.0);
         node.set_max_numeric_value(100.0);
-        // As a decimal: HTML takes no value between its steps.
+        // Rounded to a decimal: an HTML slider accepts only multiples of its step.
         node.set_numeric_value_step((f64::from(KEY_STEP) * 1000.0).round() / 10.0);
     });
     if response.clicked() || response.drag_started() {
         response.request_focus();
     }
-    // The divider is where the pointer is: ways that add up would leave it behind.
+    // Uses the pointer's position: summed drag deltas would drift away from it.
     let pointer = response.dragged().then(|| response.interact_pointer_pos()).flatten();
     let dragged = pointer.map(|pointer| (pointer.x - area.left()) / area.width().max(1.0));
-    let to = told(ui, response.id).or(dragged).or_else(|| moved(ui, &response).map(|by| at + by));
+    let to = accesskit_value(ui, response.id).or(dragged).or_else(|| moved(ui, &response).map(|by| at + by));
     if let Some(to) = to.map(|to| to.clamp(0.0, 1.0)).filter(|&to| to != at) {
-        out.push(Command::Compare(Ask::Wipe(to)));
+        out.push(Command::Compare(CompareCommand::Wipe(to)));
     }
     response.on_hover_cursor(CursorIcon::ResizeHorizontal);
 }
 
-/// Where a screen reader puts the divider.
-fn told(ui: &Ui, id: egui::Id) -> Option<f32> {
+/// The position that a screen reader sets, as a fraction of the width.
+fn accesskit_value(ui: &Ui, id: egui::Id) -> Option<f32> {
     ui.input(|input| {
         let mut requests = input.accesskit_action_requests(id, Action::SetValue);
         requests.find_map(|request| match request.data {
@@ -178,7 +179,7 @@ fn told(ui: &Ui, id: egui::Id) -> Option<f32> {
     })
 }
 
-/// By how much keys or a screen reader move the divider, as a share of the width.
+/// The movement by keys or a screen reader, as a fraction of the width.
 fn moved(ui: &Ui, response: &egui::Response) -> Option<f32> {
     let steps = ui.input(|input| {
         let count = |action: Action| input.num_accesskit_action_requests(response.id, action) as f32;

@@ -1,4 +1,4 @@
-//! The difference to the first compared run in every readout: Δ is this run less the other.
+//! The difference from the first compared run in every readout: Δ is the selected run minus the other.
 
 use egui::{CollapsingHeader, Grid, RichText, Ui};
 use serde_json::Value;
@@ -9,17 +9,17 @@ use sightline_session::records;
 use sightline_session::step::{RunStep, StepRow};
 use sightline_track::stages::judge::Gate;
 
-use crate::compare::Closeness;
+use crate::compare::ToleranceLevel;
 use crate::compare::panel::{chip, mark};
 use crate::compare::state::Other;
 use crate::panels::digits;
 use crate::state::{State, state_of};
 use crate::theme;
 
-/// The most values of a stage that are listed.
+/// Maximum number of listed values of a stage.
 const VALUES_MAX: usize = 60;
 
-/// A signed number as differences are written.
+/// A number with its sign, as differences are displayed.
 fn signed(value: f64) -> String {
     if value == 0.0 {
         "±0".to_owned()
@@ -28,36 +28,36 @@ fn signed(value: f64) -> String {
     }
 }
 
-/// The first compared run, where there is one.
+/// The first compared run; `None` without one.
 fn first(state: &State) -> Option<Other<'_>> {
     state.others().into_iter().next()
 }
 
-/// Behind a value of the status line: its difference in a unit.
+/// Shows the difference of a value in the status line, in its unit.
 pub(crate) fn after(ui: &mut Ui, state: &State, column: &str, unit: Unit) {
     let Some(other) = first(state) else { return };
     let value = |row: &StepRow| records::row_value_in(row, column, unit);
     let values = state.row().and_then(value).zip(state.other_row(&other).and_then(value));
     let (Some((own, there)), Some(declared)) = (values, records::row_quantity(column)) else { return };
     let (delta, name) = (own - there, &declared.label);
-    let words = RichText::new(format!("Δ{}", signed(delta))).monospace().size(11.0).color(other.look.colour);
+    let words = RichText::new(format!("Δ{}", signed(delta))).monospace().size(11.0).color(other.style.colour);
     let help = format!("{name}: this run less {}", state.run_label(other.name));
     ui.label(words).on_hover_text(help);
 }
 
-/// At the end of the status line: the states of the compared runs.
+/// Shows the states of the compared runs at the end of the status line.
 pub(crate) fn states(ui: &mut Ui, state: &State) {
     for other in state.others() {
         let row = state.other_row(&other);
         let word = row.map_or_else(|| "not computed".to_owned(), |row| row.state.to_uppercase());
         let colour = row.map_or(theme::weak(), |row| theme::state(state_of(row)));
-        mark(ui, other.look);
+        mark(ui, other.style);
         ui.label(RichText::new(word).strong().size(11.0).color(colour))
             .on_hover_text(format!("the state of {} here", state.run_label(other.name)));
     }
 }
 
-/// Below a gate: value, limit and verdict of the first compared run.
+/// Shows value, limit and verdict of the first compared run, below a gate.
 pub(crate) fn gate(ui: &mut Ui, state: &State, gate: &Gate) {
     let Some(other) = first(state) else { return };
     let trace = state.other_trace(other.name).ready();
@@ -76,30 +76,30 @@ pub(crate) fn gate(ui: &mut Ui, state: &State, gate: &Gate) {
         }
     };
     ui.horizontal(|ui| {
-        mark(ui, other.look);
+        mark(ui, other.style);
         ui.add(egui::Label::new(theme::note(words)).truncate());
     });
 }
 
-/// In the inspector: the values of the selected stage, as `record` reads them, that differ from those of the first
-/// compared run.
+/// Shows, in the inspector, the values of the selected stage that differ from those of the first compared run; `record`
+/// reads them from a step.
 pub(crate) fn record(ui: &mut Ui, state: &State, record: impl Fn(&RunStep) -> Option<Value>) {
     let Some(other) = first(state) else { return };
     let label = state.run_label(other.name);
     let (own, there) = (state.trace(), state.other_trace(other.name).ready());
     let (Some(own), Some(there)) = (own, there) else {
-        ui.horizontal(|ui| chip(ui, other.look, &format!("{label}: no record of this step yet")));
+        ui.horizontal(|ui| chip(ui, other.style, &format!("{label}: no record of this step yet")));
         return;
     };
     let (own, there) = (record(own).unwrap_or_default(), record(there).unwrap_or_default());
     let found = differences(&there, &own, &state.tolerance());
     let title = match found.len() {
-        0 if state.compare.closeness == Closeness::Exact => format!("Δ vs {label}: identical"),
-        0 => format!("Δ vs {label}: equal within {}", state.compare.closeness.word()),
+        0 if state.compare.tolerance == ToleranceLevel::Exact => format!("Δ vs {label}: identical"),
+        0 => format!("Δ vs {label}: equal within {}", state.compare.tolerance.word()),
         1 => format!("Δ vs {label}: 1 value differs"),
         count => format!("Δ vs {label}: {count} values differ"),
     };
-    ui.horizontal(|ui| chip(ui, other.look, &title));
+    ui.horizontal(|ui| chip(ui, other.style, &title));
     if found.is_empty() {
         return;
     }
@@ -110,8 +110,8 @@ pub(crate) fn record(ui: &mut Ui, state: &State, record: impl Fn(&RunStep) -> Op
         Grid::new("differences").num_columns(4).spacing([8.0, 2.0]).show(ui, |ui| {
             for (name, colour) in [
                 ("value", theme::weak()),
-                ("this", state.own_look().colour),
-                (label.as_str(), other.look.colour),
+                ("this", state.own_style().colour),
+                (label.as_str(), other.style.colour),
                 ("Δ", theme::weak()),
             ] {
                 ui.label(RichText::new(name).small().color(colour));
@@ -126,7 +126,7 @@ pub(crate) fn record(ui: &mut Ui, state: &State, record: impl Fn(&RunStep) -> Op
     ui.separator();
 }
 
-/// One value: `a` is the other run's, `b` this one's.
+/// Shows one value: `a` of the other run, `b` of the selected one.
 fn row(ui: &mut Ui, difference: &Difference) {
     let [there, own] = told_apart(&difference.a, &difference.b);
     let unit = &difference.unit;
@@ -139,7 +139,7 @@ fn row(ui: &mut Ui, difference: &Difference) {
         .on_hover_text(&difference.path);
     ui.label(theme::number(own).size(11.0));
     ui.label(theme::number(there).size(11.0));
-    // Of a list it is a length, which has no sign.
+    // For a list, the difference is a length, which has no sign.
     let is_list = matches!(difference.a, Value::Array(_));
     let delta = difference.delta.map(|delta| if is_list { digits(delta) } else { signed(delta) });
     ui.label(theme::number(delta.unwrap_or_default()).size(11.0));

@@ -1,4 +1,4 @@
-//! Each run's surroundings of the target, side by side at one magnification.
+//! The surroundings of the target in each run, side by side at the same magnification.
 
 use egui::{Rect, Ui, UiBuilder, vec2};
 use sightline_session::compare::RunName;
@@ -8,7 +8,7 @@ use sightline_vision::image::PixelRect;
 
 use crate::command::{Command, Zoomable};
 use crate::compare::panel::marks;
-use crate::compare::state::{Look, place_of_target, scale_of};
+use crate::compare::state::{RunStyle, place_of_target, scale_of};
 use crate::drawing::overlay::{Overlay, paint_words};
 use crate::drawing::raster::Raster;
 use crate::drawing::view2d::{Canvas, View2d};
@@ -17,39 +17,39 @@ use crate::panels::status_line::STATUS;
 use crate::state::State;
 use crate::theme;
 
-/// Room between two runs, points.
+/// Gap between two runs, points.
 const GAP: f32 = 4.0;
 
 /// One run's part of the panel.
-struct Part<'a> {
+struct Tile<'a> {
     name: RunName,
     run: &'a RunView,
-    look: Look,
+    style: RunStyle,
     trace: Option<&'a RunStep>,
     raster: Option<&'a Raster>,
 }
 
-/// Shows the parts. Returns where the image of the run that is looked at lies.
+/// Shows the parts. Returns the screen area of the selected run's image.
 pub(crate) fn show(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Command>) -> LeftImage {
     let (own, run) = state.own_name().zip(state.run())?;
-    let mut parts =
-        vec![Part { name: own, run, look: state.own_look(), trace: state.trace(), raster: Some(raster) }];
-    parts.extend(state.others().into_iter().map(|other| Part {
+    let mut tiles =
+        vec![Tile { name: own, run, style: state.own_style(), trace: state.trace(), raster: Some(raster) }];
+    tiles.extend(state.others().into_iter().map(|other| Tile {
         name: other.name,
         run: other.run,
-        look: other.look,
+        style: other.style,
         trace: state.other_trace(other.name).ready(),
         raster: state.other_image(other.name).ready(),
     }));
     let area = ui.available_rect_before_wrap();
-    let count = parts.len() as f32;
+    let count = tiles.len() as f32;
     let width = (area.width() - GAP * (count - 1.0)) / count;
     let mut shown = None;
-    for (i, part) in parts.iter().enumerate() {
+    for (i, tile) in tiles.iter().enumerate() {
         let left = area.left() + (width + GAP) * i as f32;
         let frame = Rect::from_min_size(egui::pos2(left, area.top()), vec2(width, area.height()));
         let mut inside = ui.new_child(UiBuilder::new().max_rect(frame).id_salt(("side", i)));
-        let canvas = show_part(&mut inside, state, part, out);
+        let canvas = show_tile(&mut inside, state, tile, out);
         if i == 0 {
             shown = canvas.map(|canvas| (canvas.transform, raster.size()));
         }
@@ -58,10 +58,10 @@ pub(crate) fn show(ui: &mut Ui, state: &State, raster: &Raster, out: &mut Vec<Co
     shown
 }
 
-fn show_part(ui: &mut Ui, state: &State, part: &Part<'_>, out: &mut Vec<Command>) -> Option<Canvas> {
-    let label = state.run_label(part.name);
-    let Some(raster) = part.raster else {
-        let sentence = match state.beside(part.name, state.cursor.step) {
+fn show_tile(ui: &mut Ui, state: &State, tile: &Tile<'_>, out: &mut Vec<Command>) -> Option<Canvas> {
+    let label = state.run_label(tile.name);
+    let Some(raster) = tile.raster else {
+        let sentence = match state.aligned_step(tile.name, state.cursor.step) {
             Some(step) => format!("{label}: the image of step {step} is being loaded."),
             None => format!("{label} has no stop aligned with this one; align by step to see it."),
         };
@@ -72,26 +72,26 @@ fn show_part(ui: &mut Ui, state: &State, part: &Part<'_>, out: &mut Vec<Command>
     let [width, height] = raster.size();
     let region = PixelRect::whole(width, height);
     let view = state.view(Zoomable::Left);
-    let centre = part.trace.and_then(place_of_target).unwrap_or_else(|| region.centre());
+    let centre = tile.trace.and_then(place_of_target).unwrap_or_else(|| region.centre());
     let canvas = Canvas::new(ui, View2d::At { centre, scale: scale_of(view) }, region, STATUS);
     canvas.texture(&raster.texture, region);
     canvas.pixel_grid(region);
-    if let Some(trace) = part.trace.filter(|_| state.marks) {
+    if let Some(trace) = tile.trace.filter(|_| state.marks) {
         let overlay = Overlay::new(&canvas.painter, &canvas.transform);
-        marks::paint(&overlay, trace, part.run, part.look, state);
+        marks::paint(&overlay, trace, tile.run, tile.style, state);
     }
-    let words = words(part, &label, state.cursor.step);
+    let words = words(tile, &label, state.cursor.step);
     paint_words(
         &canvas.painter,
         canvas.transform.rect.left_top() + vec2(8.0, 12.0),
         &words,
-        part.look.colour,
+        tile.style.colour,
     );
     canvas
         .response
         .widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, format!("left image, {words}")));
     ui.label(theme::note(format!("about the target, ×{:.1}", canvas.transform.scale)));
-    // Each part stays about its own target; only the magnification is theirs together.
+    // Each part remains centred on its own target; only the magnification is shared.
     if let Some(moved @ View2d::At { .. }) = canvas.moved
         && scale_of(moved) != scale_of(view)
     {
@@ -102,8 +102,8 @@ fn show_part(ui: &mut Ui, state: &State, part: &Part<'_>, out: &mut Vec<Command>
     Some(canvas)
 }
 
-fn words(part: &Part<'_>, label: &str, step: usize) -> String {
-    match part.trace {
+fn words(tile: &Tile<'_>, label: &str, step: usize) -> String {
+    match tile.trace {
         None => format!("{label}: this step is not loaded or not computed"),
         Some(trace) => {
             let score = trace.row().ncc.map_or_else(String::new, |ncc| format!(", ncc {ncc:.2}"));

@@ -1,4 +1,4 @@
-//! Comparing runs: choosers and keys, each way of the left image, the differences in every readout, and the table.
+//! Comparing runs: choosers and keys, each view of the left image, the differences in every readout, and the table.
 
 mod panels;
 mod state;
@@ -23,7 +23,7 @@ use sightline_vision::image::{GrayImage, npy};
 
 use crate::cache::{Item, Key, StepKey};
 use crate::command::{Command, Go, Layer, Mode, Stage};
-use crate::compare::{Ask, Sort, View};
+use crate::compare::{CompareCommand, Sort, View};
 use crate::drawing::raster::Raster;
 use crate::drawing::view2d::View2d;
 use crate::layout::show_pane;
@@ -38,7 +38,7 @@ use crate::tests::fixture::STOPS;
 const A: RunName = RunName { target: 0, run: 0 };
 const B: RunName = RunName { target: 0, run: 1 };
 
-/// Where run B sees the target from step 3 on, px.
+/// Pixel at which run B locates the target from step 3 on.
 const PIXEL_B: Pixel = Pixel::new(fixture::PIXEL.x + 8.0, fixture::PIXEL.y);
 
 /// The records of run A.
@@ -46,7 +46,7 @@ fn traces_a() -> Vec<RunStep> {
     (0..STOPS - 1).map(fixture::trace).collect()
 }
 
-/// The records of run B, which asks for less from step 3 on and goes on tracking, a little beside.
+/// The records of run B, whose gates are looser from step 3 on, so that it keeps tracking, slightly off the target.
 fn traces_b() -> Vec<RunStep> {
     let mut traces = traces_a();
     for trace in traces.iter_mut().skip(3) {
@@ -76,7 +76,7 @@ fn settings_b() -> Settings {
     Settings::default().with(&[("ncc_min".to_owned(), serde_json::json!(0.3))].into()).unwrap()
 }
 
-/// The drive with both runs, at `step`, both loaded there.
+/// The drive at `step` with both runs loaded there.
 fn two_runs(context: &Context, step: usize) -> State {
     let mut state = fixture::at_step(context, step);
     let traces = traces_b();
@@ -96,23 +96,23 @@ fn two_runs(context: &Context, step: usize) -> State {
     state.session.as_mut().unwrap().targets[0].runs.push(run);
     for trace in traces {
         let key = StepKey { session: "s1".to_owned(), target: 0, run: 1, step: trace.step };
-        state.cache.arrived(Key::Trace(key), Ok(Item::Trace(Arc::new(trace))), 0.0);
+        state.cache.store(Key::Trace(key), Ok(Item::Trace(Arc::new(trace))), 0.0);
     }
     let key = StepKey { session: "s1".to_owned(), target: 0, run: 1, step };
     for (name, side) in [(ArrayName::MATCHED, 21), (ArrayName::ROLLED, 31), (ArrayName::SURFACE, 31)] {
         let wave = |x: u32, y: u32| image::Luma([((x * 7 + y * 3) % 11) as f32 / 11.0]);
         let image = GrayImage::from_fn(side, side, wave);
         let raster = Raster::from_npy(context, name, &npy::encode(&image).unwrap()).unwrap();
-        state.cache.arrived(Key::Array(key.clone(), name), Ok(Item::Raster(Arc::new(raster))), 0.0);
+        state.cache.store(Key::Array(key.clone(), name), Ok(Item::Raster(Arc::new(raster))), 0.0);
     }
     state
 }
 
-/// As [`two_runs`], compared, with what the server says of them.
+/// As [`two_runs`], compared, with the server's comparison.
 fn compared(context: &Context, step: usize) -> State {
     let mut state = two_runs(context, step);
     state.compare.wants_metrics = true;
-    state.perform(Command::Compare(Ask::With { place: 0, run: Some(B) }));
+    state.perform(Command::Compare(CompareCommand::With { place: 0, run: Some(B) }));
     answer(&mut state);
     state
 }
@@ -122,7 +122,7 @@ fn steps(name: RunName) -> Vec<Arc<RunStep>> {
     traces.into_iter().map(Arc::new).collect()
 }
 
-/// Answers what the page asks as the server would; returns how many comparisons it asked for.
+/// Answers the page's requests as the server would; returns the number of comparisons requested.
 fn answer(state: &mut State) -> usize {
     let mut comparisons = 0;
     for _ in 0..6 {
@@ -145,7 +145,7 @@ fn answer(state: &mut State) -> usize {
     comparisons
 }
 
-/// A panel of the compared runs at step 3, shown in one way.
+/// A panel of the compared runs at step 3 in one view.
 fn panel(pane: Pane, view: View) -> Shown<'static> {
     Shown::new(
         [760.0, 480.0],
@@ -172,7 +172,7 @@ fn paints(shown: &Shown<'_>, words: &str) -> bool {
     shown.harness.output().shapes.iter().any(|clipped| has(&clipped.shape, words))
 }
 
-/// Answers a comparison as if run B had driven twice as far between its stops.
+/// Answers with a comparison in which run B drove twice as far between its stops.
 fn twice_as_far(state: &mut State) {
     let [new] = bodies::<CompareRuns>(state).try_into().unwrap();
     let mut faster = traces_b();

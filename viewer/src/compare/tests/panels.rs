@@ -1,4 +1,4 @@
-//! What the panels show of compared runs, and what their controls ask for.
+//! The panels' display of compared runs, and the commands of their controls.
 
 use crate::tests::compare::*;
 
@@ -6,12 +6,12 @@ use crate::tests::compare::*;
 fn the_top_bar_chooses_the_run_to_compare_with_and_takes_it_out() {
     let mut shown = Shown::new([1500.0, 300.0], |context| two_runs(context, 3), bars::top);
     shown.click("compared with: none");
-    assert_eq!(shown.click("run B"), vec![Command::Compare(Ask::With { place: 0, run: Some(B) })]);
+    assert_eq!(shown.click("run B"), vec![Command::Compare(CompareCommand::With { place: 0, run: Some(B) })]);
     let mut shown = Shown::new([1500.0, 300.0], |context| compared(context, 3), bars::top);
     shown.says("run looked at: run A").says("compared with: run B").says("third run compared: +");
     assert_eq!(
         shown.click("take compared with out"),
-        vec![Command::Compare(Ask::With { place: 0, run: None })]
+        vec![Command::Compare(CompareCommand::With { place: 0, run: None })]
     );
     let alone = Shown::new([1500.0, 300.0], |context| fixture::at_step(context, 3), bars::top);
     alone.says("compared with none");
@@ -54,16 +54,16 @@ fn the_row_above_the_image_says_the_sentence_and_chooses_how_to_compare() {
     let (view, button) = ("compare by: marks", "First divergence (D)");
     let top = |label: &str| shown.harness.get_by_label(label).rect().center().y;
     assert!((top(view) - top(button)).abs() < 8.0, "one row: {} and {}", top(view), top(button));
-    assert_eq!(shown.click("First divergence (D)"), vec![Command::Compare(Ask::FirstDivergence)]);
+    assert_eq!(shown.click("First divergence (D)"), vec![Command::Compare(CompareCommand::FirstDivergence)]);
     shown.click("compare options");
     shown.says("align by step").says("ignore below none");
-    assert_eq!(shown.click("hold target"), vec![Command::Compare(Ask::Stabilise)]);
+    assert_eq!(shown.click("hold target"), vec![Command::Compare(CompareCommand::Stabilise)]);
     let mut shown = panel(Pane::Left, View::Marks);
     shown.click("compare options");
-    assert_eq!(shown.click("overlay previous step"), vec![Command::Compare(Ask::OnionSkin)]);
+    assert_eq!(shown.click("overlay previous step"), vec![Command::Compare(CompareCommand::OnionSkin)]);
     let mut shown = panel(Pane::Left, View::Marks);
     shown.click("compare by: marks");
-    assert_eq!(shown.click("difference"), vec![Command::Compare(Ask::View(View::Difference))]);
+    assert_eq!(shown.click("difference"), vec![Command::Compare(CompareCommand::View(View::Difference))]);
 }
 
 #[test]
@@ -92,7 +92,7 @@ fn the_right_image_marks_the_compared_runs_as_well() {
 fn marks_of_another_stop_are_not_painted_on_this_one() {
     let shown = Shown::pane(Pane::Left, |context| {
         let mut state = compared(context, 2);
-        state.perform(Command::Compare(Ask::Align(Alignment::Distance)));
+        state.perform(Command::Compare(CompareCommand::Align(Alignment::Distance)));
         twice_as_far(&mut state);
         state
     });
@@ -107,7 +107,7 @@ fn side_by_side_shows_each_run_about_its_own_target() {
     let rects = ["left image, run A: lost, ncc 0.41", "left image, run B: tracking, ncc 0.41"]
         .map(|label| shown.harness.get_by_label(label).rect());
     assert!(rects[0].right() <= rects[1].left() && (rects[0].width() - rects[1].width()).abs() < 1.0);
-    // While a target is picked, the whole image is there.
+    // While a target is being picked, the whole image is shown.
     let picking = Shown::pane(Pane::Left, |context| {
         let mut state = compared(context, 3);
         (state.compare.view, state.mode) = (View::SideBySide, Mode::Pick);
@@ -137,16 +137,17 @@ fn the_divider_of_the_wipe_moves_by_drag_and_by_keyboard_and_its_keys_do_not_ste
     shown.harness.key_press(Keyboard::ArrowRight);
     shown.harness.run_steps(1);
     let commands = std::mem::take(shown.harness.state_mut());
-    assert_eq!(commands, vec![Command::Compare(Ask::Wipe(0.55))]);
+    assert_eq!(commands, vec![Command::Compare(CompareCommand::Wipe(0.55))]);
     shown.harness.key_press(Keyboard::Home);
     shown.harness.run_steps(1);
-    assert_eq!(std::mem::take(shown.harness.state_mut()), vec![Command::Compare(Ask::Wipe(0.0))]);
+    assert_eq!(std::mem::take(shown.harness.state_mut()), vec![Command::Compare(CompareCommand::Wipe(0.0))]);
     let middle = shown.harness.get_by_label(label).rect().center();
     shown.harness.drag_at(middle);
     shown.harness.hover_at(middle + egui::vec2(60.0, 0.0));
     shown.harness.run_steps(1);
     let commands = std::mem::take(shown.harness.state_mut());
-    let is_right = |command: &Command| matches!(command, Command::Compare(Ask::Wipe(at)) if *at > 0.5);
+    let is_right =
+        |command: &Command| matches!(command, Command::Compare(CompareCommand::Wipe(at)) if *at > 0.5);
     assert!(commands.iter().any(is_right), "{commands:?}");
     assert!(paints(&shown, "run A") && paints(&shown, "run B"));
 }
@@ -164,7 +165,10 @@ fn the_other_run_shows_while_x_is_held_and_nothing_flashes_by_itself() {
     shown.harness.state_mut().clear();
     shown.harness.key_down(Keyboard::X);
     shown.harness.run_steps(1);
-    assert_eq!(std::mem::take(shown.harness.state_mut()), vec![Command::Compare(Ask::Blink(true))]);
+    assert_eq!(
+        std::mem::take(shown.harness.state_mut()),
+        vec![Command::Compare(CompareCommand::Blink(true))]
+    );
     shown.harness.key_up(Keyboard::X);
     shown.harness.run_steps(1);
     assert!(shown.harness.state_mut().is_empty(), "this state does not blink: nothing has to end");
@@ -228,7 +232,7 @@ fn a_held_target_stays_in_the_middle_of_the_image() {
             move |context| {
                 let mut state = fixture::at_step(context, 2);
                 state.views.left = view;
-                state.perform(Command::Compare(Ask::Stabilise));
+                state.perform(Command::Compare(CompareCommand::Stabilise));
                 state
             },
             move |ui, state, out| {
@@ -247,13 +251,13 @@ fn the_step_before_shines_through_and_says_so() {
     let shown = Shown::pane(Pane::Left, |context| {
         let mut state = fixture::at_step(context, 2);
         let raster =
-            state.cache.raster(&state.image_key(2, crate::cache::Eye::Left).unwrap()).ready().unwrap();
+            state.cache.raster(&state.image_key(2, crate::cache::ImageSide::Left).unwrap()).ready().unwrap();
         let values = raster.values.clone();
         let bytes = sightline_vision::image::io::encode_png_u8(&values).unwrap();
         let raster = Raster::from_png(context, "left", &bytes).unwrap();
-        let key = state.image_key(1, crate::cache::Eye::Left).unwrap();
-        state.cache.arrived(key, Ok(Item::Raster(Arc::new(raster))), 0.0);
-        state.perform(Command::Compare(Ask::OnionSkin));
+        let key = state.image_key(1, crate::cache::ImageSide::Left).unwrap();
+        state.cache.store(key, Ok(Item::Raster(Arc::new(raster))), 0.0);
+        state.perform(Command::Compare(CompareCommand::OnionSkin));
         state
     });
     assert!(paints(&shown, "step 1 shines through"));
@@ -302,33 +306,33 @@ fn the_table_links_every_metric_to_its_worst_step() {
     shown.says("ncc_min=0.3").says("protocol: sightline").says("left out of all metrics: step 0");
     shown.says("SETTINGS THAT DIFFER").says("0.3").says("0.7");
     let label = "max_px 5.500 of ridge · run B, worst at step 4";
-    assert_eq!(shown.click(label), vec![Command::Compare(Ask::Visit { run: B, step: 4 })]);
+    assert_eq!(shown.click(label), vec![Command::Compare(CompareCommand::Visit { run: B, step: 4 })]);
     let star = shown.click("baseline: ridge · run A");
-    assert_eq!(star, vec![Command::Compare(Ask::Baseline(A))]);
-    assert_eq!(shown.click("compare ridge · run B"), vec![Command::Compare(Ask::Toggle(B))]);
+    assert_eq!(star, vec![Command::Compare(CompareCommand::Baseline(A))]);
+    assert_eq!(shown.click("compare ridge · run B"), vec![Command::Compare(CompareCommand::Toggle(B))]);
     let sort = Sort { metric: Some("max_px".to_owned()), is_descending: false };
-    assert_eq!(shown.click("sort by max_px"), vec![Command::Compare(Ask::Sort(sort))]);
+    assert_eq!(shown.click("sort by max_px"), vec![Command::Compare(CompareCommand::Sort(sort))]);
 }
 
 #[test]
 fn the_table_is_sorted_and_filtered_and_the_baseline_decides_which_settings_show() {
     let mut state = compared(&Context::default(), 3);
     assert_eq!(runs::table::order(&state), [A, B]);
-    // Run A has the smaller largest error (0.5 px against 5.5 px), run B survives longer.
+    // Run A has the smaller maximum error (0.5 px against 5.5 px), run B survives longer.
     for (metric, is_descending, expected) in
         [("max_px", true, [B, A]), ("max_px", false, [A, B]), ("survival_steps", true, [B, A])]
     {
         let sort = Sort { metric: Some(metric.to_owned()), is_descending };
-        state.perform(Command::Compare(Ask::Sort(sort)));
+        state.perform(Command::Compare(CompareCommand::Sort(sort)));
         assert_eq!(runs::table::order(&state), expected, "{metric}");
     }
-    state.perform(Command::Compare(Ask::Filter("ncc_MIN".to_owned())));
+    state.perform(Command::Compare(CompareCommand::Filter("ncc_MIN".to_owned())));
     assert_eq!(runs::table::order(&state), [B]);
     let shown = Shown::new(
         [1500.0, 900.0],
         |context| {
             let mut state = compared(context, 3);
-            state.perform(Command::Compare(Ask::Baseline(B)));
+            state.perform(Command::Compare(CompareCommand::Baseline(B)));
             state
         },
         |ui, state, out| {
@@ -338,7 +342,7 @@ fn the_table_is_sorted_and_filtered_and_the_baseline_decides_which_settings_show
     shown.says("settings unlike run B").says("ncc_min=0.7").says("Δ−5");
     let none = Shown::pane(Pane::Runs, |context| {
         let mut state = compared(context, 3);
-        state.perform(Command::Compare(Ask::Filter("nonsense".to_owned())));
+        state.perform(Command::Compare(CompareCommand::Filter("nonsense".to_owned())));
         state
     });
     none.says("No run has these words").says("0 of 2 runs");

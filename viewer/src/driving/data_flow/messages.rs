@@ -1,6 +1,7 @@
 //! The components of targeted driving, and the last message on every edge between them at a stop, in words.
 //!
-//! The messages are made from the record of the step and from the decisions of the drive; lengths are in m or cm, angles in deg.
+//! The messages are formed from the record of the step and the decisions of the drive; lengths are in m or cm, angles in
+//! deg.
 //!
 //! Source: Kim et al. (2009), §3, Fig. 1; R2, R3.
 
@@ -13,7 +14,7 @@ use crate::state::State;
 
 /// A component of targeted driving.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Part {
+pub(super) enum Component {
     Operator,
     Tracker,
     MastCameras,
@@ -29,14 +30,14 @@ pub(super) enum Part {
 /// A message from one component to another.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Message {
-    pub(super) from: Part,
-    pub(super) to: Part,
+    pub(super) from: Component,
+    pub(super) to: Component,
     /// The message; `None` if there is none at this stop.
     pub(super) text: Option<String>,
 }
 
-impl Part {
-    /// In the order in which they are drawn.
+impl Component {
+    /// All components, in drawing order.
     pub(super) const ALL: [Self; 10] = [
         Self::Operator,
         Self::Goal,
@@ -50,7 +51,7 @@ impl Part {
         Self::Locomotor,
     ];
 
-    /// Its name on the page.
+    /// The name in the panel.
     pub(super) const fn name(self) -> &'static str {
         match self {
             Self::Operator => "operator",
@@ -83,11 +84,11 @@ impl Part {
 
 /// The last message on every edge at the cursor's stop.
 pub(super) fn messages(state: &State) -> Vec<Message> {
-    use Part::{
+    use Component::{
         Goal, HazardMap, Hazcams, Locomotor, MastCameras, MastPointing, Navigator, Operator, PoseEstimate,
         Tracker,
     };
-    let edges: [(Part, Part, Option<String>); 12] = [
+    let edges: [(Component, Component, Option<String>); 12] = [
         (Operator, Tracker, designation(state)),
         (Operator, Goal, command(state)),
         (Tracker, Goal, located(state)),

@@ -1,4 +1,5 @@
-//! The panel “Data flow”: the components of targeted driving, and the last message on each edge between them at the cursor's stop.
+//! The panel “Data flow”: the components of targeted driving, and the last message on each edge between them at the
+//! cursor's stop.
 //!
 //! Source: Kim et al. (2009), §3, Fig. 1; R2, R3.
 
@@ -15,20 +16,20 @@ use egui::{
     pos2, vec2,
 };
 
-use self::messages::{Message, Part, messages};
+use self::messages::{Component, Message, messages};
 
-/// Smallest size of the drawing in a narrow panel, points.
+/// Minimum size of the drawing in a narrow panel, points.
 const LEAST: [f32; 2] = [330.0, 500.0];
-/// From this width on it can be lower, points.
+/// Width from which the drawing may be lower, points.
 const WIDE: f32 = 560.0;
-/// Its smallest height there, points.
+/// Minimum height of a wide drawing, points.
 const LOW: f32 = 340.0;
 /// Free space between two components, points.
 const GAP: [f32; 2] = [18.0, 18.0];
 /// Columns and rows of the drawing.
 const GRID: [f32; 2] = [3.0, 4.0];
 
-impl Part {
+impl Component {
     /// Column and row in the drawing, and the number of rows.
     const fn place(self) -> [f32; 3] {
         match self {
@@ -83,7 +84,7 @@ fn sheets(state: &State) -> Result<Vec<Sheet>, String> {
     let columns = ["from", "to", "message"].map(|name| Column::new(name, "")).to_vec();
     let mut sheet = Sheet::of(format!("messages at step {}", state.cursor.step), columns);
     for message in messages(state) {
-        let word = |part: Part| Cell::Word(part.name().to_owned());
+        let word = |part: Component| Cell::Word(part.name().to_owned());
         let text = message.text.map_or(Cell::Nothing, Cell::Word);
         sheet.row(false, vec![word(message.from), word(message.to), text]);
     }
@@ -100,7 +101,7 @@ fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         for message in &messages {
             arrow(ui, message, whole);
         }
-        for part in Part::ALL {
+        for part in Component::ALL {
             let inner = UiBuilder::new().max_rect(part.rect(whole)).id_salt(part.name());
             ui.scope_builder(inner, |ui| component(ui, part, &messages, out));
         }
@@ -113,7 +114,7 @@ fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 }
 
 /// Draws a component: its name, which selects its stage, and its messages by receiver.
-fn component(ui: &mut Ui, part: Part, messages: &[Message], out: &mut Vec<Command>) {
+fn component(ui: &mut Ui, part: Component, messages: &[Message], out: &mut Vec<Command>) {
     let rect = ui.max_rect();
     let frame = Frame::new()
         .fill(theme::panel())
@@ -146,7 +147,7 @@ fn component(ui: &mut Ui, part: Part, messages: &[Message], out: &mut Vec<Comman
     });
 }
 
-/// The edge of a message, from border to border.
+/// Draws the edge of a message from border to border.
 fn arrow(ui: &Ui, message: &Message, whole: Rect) {
     let [from, to] = [message.from, message.to].map(|part| part.rect(whole));
     let colour = if message.text.is_some() { theme::accent() } else { theme::unknown() };
@@ -154,7 +155,7 @@ fn arrow(ui: &Ui, message: &Message, whole: Rect) {
     ui.painter().arrow(start, end - start, Stroke::new(1.5, colour));
 }
 
-/// Where the edge between two components leaves the one and meets the other.
+/// The end points of the edge between two components.
 fn ends(from: Rect, to: Rect) -> (Pos2, Pos2) {
     let shared = |a: Rangef, b: Rangef| {
         let both = a.intersection(b);
@@ -218,15 +219,20 @@ mod tests {
             messages(state).into_iter().filter_map(of).collect::<Vec<_>>()
         };
         let silent_here = silent(&state);
-        let is_nothing = |row: &&crate::panels::sheets::Row| row.cells[2] == Cell::Nothing;
+        let is_nothing = |row: &&crate::panels::sheets::SheetRow| row.cells[2] == Cell::Nothing;
         assert_eq!(sheet.rows.iter().filter(is_nothing).count(), silent_here.len());
-        assert!(silent_here.contains(&(Part::MastCameras, Part::PoseEstimate)), "odometry is off");
-        assert!(silent_here.contains(&(Part::HazardMap, Part::Navigator)), "no path was chosen on a map");
+        assert!(silent_here.contains(&(Component::MastCameras, Component::PoseEstimate)), "odometry is off");
+        assert!(
+            silent_here.contains(&(Component::HazardMap, Component::Navigator)),
+            "no path was chosen on a map"
+        );
         // A replayed drive has neither command nor decisions.
         let replayed = silent(&fixture::at_step(&egui::Context::default(), 2));
-        for edge in
-            [(Part::Operator, Part::Goal), (Part::Goal, Part::Navigator), (Part::Navigator, Part::Locomotor)]
-        {
+        for edge in [
+            (Component::Operator, Component::Goal),
+            (Component::Goal, Component::Navigator),
+            (Component::Navigator, Component::Locomotor),
+        ] {
             assert!(replayed.contains(&edge) && !silent_here.contains(&edge), "{edge:?}");
         }
     }

@@ -1,6 +1,6 @@
-//! Any action of the page as a text for a shell: as `curl`, and as `sightline …` where the command line has it.
+//! Any action of the page as a shell command: with `curl`, and with `sightline …` if the command line supports it.
 
-mod asked;
+mod calls;
 
 use sightline_api::endpoint::Call;
 use sightline_api::endpoints::{CancelRun, DesignateTarget, ForkRun, MoveCursor, ShowStep};
@@ -14,25 +14,25 @@ use sightline_track::target::Designation;
 
 use crate::state::{State, run_letter};
 
-/// An action that a person may want to repeat elsewhere.
+/// An action that the user can repeat in a shell.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Action {
-    /// What it does.
+    /// A description of the action.
     pub words: String,
-    /// As a command of the program, where it has one.
+    /// The `sightline` command; `None` if the command line does not support the action.
     pub command: Option<String>,
-    /// As `curl`.
+    /// The `curl` command.
     pub http: String,
 }
 
 impl Action {
-    /// A call that the command line does not have.
+    /// An action without a `sightline` command.
     fn of(state: &State, words: String, call: Call) -> Self {
         Self { words, command: None, http: http(&state.origin, call) }
     }
 }
 
-/// A call as `curl`.
+/// A call as a `curl` command.
 pub(crate) fn http(origin: &str, call: Call) -> String {
     let body = call.body.and_then(|body| String::from_utf8(body).ok());
     let url = format!("{origin}/api/v1/{}", call.path);
@@ -40,13 +40,13 @@ pub(crate) fn http(origin: &str, call: Call) -> String {
     Curl { method, url: &url, body: body.as_deref(), revision, file: None }.text()
 }
 
-/// A file of an export as `curl`.
+/// The download of an exported file as a `curl` command.
 pub(crate) fn download(origin: &str, entry: &ExportEntry) -> String {
     let url = format!("{origin}/api/v1/{}", entry.path);
     Curl { method: "GET", url: &url, body: None, revision: None, file: Some(&entry.file) }.text()
 }
 
-/// An answer that never ends as `curl`, which hands every part of it on at once.
+/// An endless reply as a `curl` command that outputs every part at once.
 pub(crate) fn stream(origin: &str, path: &str) -> String {
     let url = format!("{origin}/api/v1/{path}");
     let text = Curl { method: "GET", url: &url, body: None, revision: None, file: None }.text();
@@ -59,7 +59,8 @@ fn designate(state: &State, words: String, session: &str, target: &NewTarget) ->
     Action { command: track(state, target), ..Action::of(state, words, call) }
 }
 
-/// A fork of a run as an action; the command line has no fork on the way, whose steps belong to two runs.
+/// A fork of a run as an action. The command line supports it only at the designation; a later fork's steps belong to two
+/// runs.
 fn fork(state: &State, words: String, session: &str, target: &TargetView, new: &NewRun) -> Action {
     let at = AtTarget { session: session.to_owned(), target: target.number };
     let parent = target.runs.iter().find(|run| run.number == new.run);
@@ -71,7 +72,7 @@ fn fork(state: &State, words: String, session: &str, target: &TargetView, new: &
     Action { command, ..Action::of(state, words, Call::with_body::<ForkRun>(&at, new)) }
 }
 
-/// The pick of a target, as it would be asked for.
+/// The designation of a target, as a request.
 fn target_of(target: &TargetView, settings: Changes) -> NewTarget {
     let designation = target.designation;
     NewTarget {
@@ -87,7 +88,7 @@ fn track(state: &State, target: &NewTarget) -> Option<String> {
     Some(shell::track(drive, designation, &target.settings))
 }
 
-/// The actions at the cursor, and those that led there.
+/// The actions of the current view, and those that led to it.
 pub(crate) fn actions(state: &State) -> Vec<Action> {
     let Some(session) = state.session.as_ref().map(|session| session.id.clone()) else { return Vec::new() };
     let call = Call::with_body::<MoveCursor>(&AtSession { session: session.clone() }, &state.cursor);
@@ -98,8 +99,8 @@ pub(crate) fn actions(state: &State) -> Vec<Action> {
     if let Some(key) = state.step_key(state.cursor.step).filter(|_| state.row().is_some()) {
         actions.push(Action::of(state, format!("read step {}", key.step), Call::to::<ShowStep>(&key)));
     }
-    let asked = asked::calls(state, &session).into_iter();
-    actions.extend(asked.map(|(words, call)| Action::of(state, words, call)));
+    let calls = calls::calls(state, &session).into_iter();
+    actions.extend(calls.map(|(words, call)| Action::of(state, words, call)));
     actions
 }
 

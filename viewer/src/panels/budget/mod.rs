@@ -1,5 +1,5 @@
-//! The error budget: a calculator over K-Eq 1 to 5 for a pair of cameras, the paper's Table I computed beside printed,
-//! and what was predicted against what was achieved (R43–R47). The equations are in `core::estimate::error_budget`.
+//! The error budget: a calculator of K-Eq 1 to 5 for a pair of cameras, the paper's Table I computed beside printed, and
+//! predicted against achieved errors (R43–R47). The equations are in `core::estimate::error_budget`.
 
 mod plot;
 mod table;
@@ -36,10 +36,10 @@ impl Panel for Budget {
     }
 }
 
-/// Focal length and baseline; none for the present cameras where no step is loaded.
+/// Focal length and baseline; `None` for the current cameras if no step is loaded.
 fn stereo(pair: Pair, state: &State) -> Option<StereoPair> {
     match pair {
-        Pair::Present => {
+        Pair::Current => {
             let pointing = &state.trace()?.point_mast;
             let pixel = pointing.predicted_left.unwrap_or_else(|| pointing.left.centre_pixel());
             StereoPair::from_cameras(&pointing.left, &pointing.right, pixel)
@@ -153,7 +153,7 @@ fn results(ui: &mut Ui, pair: &StereoPair, approach: &Approach) {
     ui.add(egui::Label::new(RichText::new(words).color(theme::verdict(is_enough))).wrap());
 }
 
-/// Whether tracking is enough for placing an instrument (R46), and by how much it improves.
+/// Whether the error with tracking suffices for instrument placement (R46), and the improvement over no tracking.
 fn verdict(budget: &ErrorBudget) -> (String, bool) {
     let is_enough = budget.with_tracking_m < PLACEMENT_NEED_M;
     let word = if is_enough { "below" } else { "NOT below" };
@@ -167,7 +167,7 @@ fn verdict(budget: &ErrorBudget) -> (String, bool) {
     )
 }
 
-/// A length in centimetres with the digits of Table I, and one more.
+/// A length in centimetres with one digit more than Table I.
 fn centimetres(length_m: f64) -> String {
     let length_cm = length_m * 100.0;
     if length_cm < 1.0 { format!("{length_cm:.3} cm") } else { format!("{length_cm:.2} cm") }

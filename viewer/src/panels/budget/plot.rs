@@ -1,7 +1,7 @@
-//! Predicted against achieved: the budget's 3σ with and without tracking over the range, and the run's errors (R47).
+//! Predicted against achieved: the budget's 3σ with and without tracking over range, and the run's errors (R47).
 //!
-//! Both axes are what an approach is read by: range in metres, and the error in centimetres on a logarithmic scale,
-//! because the errors with and without tracking lie an order of magnitude apart (R45).
+//! Range is in metres; the error is in centimetres on a logarithmic scale, because the errors with and without tracking
+//! differ by an order of magnitude (R45).
 
 use egui::{Color32, Ui, vec2};
 use egui_plot::{GridInput, GridMark, HLine, Line, LineStyle, MarkerShape, Plot, PlotUi, Points};
@@ -13,7 +13,7 @@ use crate::drawing::decimate;
 use crate::drawing::overlay;
 use crate::drawing::overlay::Mark;
 use crate::panels::chart::{few_marks, plain};
-use crate::panels::names;
+use crate::panels::chart_legend;
 use crate::state::{State, run_letter};
 use crate::theme;
 
@@ -23,7 +23,7 @@ const HEIGHT: f32 = 190.0;
 /// Errors with a tick, cm.
 const TICKS_CM: [f64; 13] = [0.01, 0.03, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 300.0];
 
-/// Smaller errors are drawn here, m: a logarithm has no zero.
+/// Smaller errors are drawn at this value, m: a logarithmic scale has no zero.
 const LEAST_M: f64 = 1e-4;
 
 /// Samples of the calculator's curves.
@@ -36,7 +36,7 @@ struct Curves {
     achieved: Vec<[f64; 2]>,
 }
 
-/// Shows the plot: of the run that is looked at, or of the calculator where there is none.
+/// Shows the plot of the selected run, or of the calculator if no run has a budget.
 pub(crate) fn show(ui: &mut Ui, state: &State, pair: Option<&StereoPair>) {
     let of_run = state.run().map(of_run).filter(|curves| !curves.with.is_empty());
     let source = match (&of_run, state.run()) {
@@ -48,8 +48,8 @@ pub(crate) fn show(ui: &mut Ui, state: &State, pair: Option<&StereoPair>) {
         return;
     };
     let run = theme::run(state.cursor.run);
-    names::show(ui, &source, &[]);
-    names::wrapped(ui, "", &names_of(&curves, run));
+    chart_legend::show(ui, &source, &[]);
+    chart_legend::wrapped(ui, "", &names_of(&curves, run));
     if curves.achieved.is_empty() {
         ui.label(theme::note("Achieved errors need a traverse whose truth is known."));
     } else {
@@ -84,9 +84,9 @@ pub(crate) fn show(ui: &mut Ui, state: &State, pair: Option<&StereoPair>) {
 
 fn names_of(curves: &Curves, run: Color32) -> Vec<(Mark, Color32, String)> {
     let mut names = vec![
-        (Mark::Stroke(overlay::Line::Dashed), theme::lost(), "without tracking".to_owned()),
-        (Mark::Stroke(overlay::Line::Solid), theme::prediction(), "with tracking".to_owned()),
-        (Mark::Stroke(overlay::Line::Dotted), theme::failed(), "3 cm needed".to_owned()),
+        (Mark::Stroke(overlay::StrokeStyle::Dashed), theme::lost(), "without tracking".to_owned()),
+        (Mark::Stroke(overlay::StrokeStyle::Solid), theme::prediction(), "with tracking".to_owned()),
+        (Mark::Stroke(overlay::StrokeStyle::Dotted), theme::failed(), "3 cm needed".to_owned()),
     ];
     if !curves.achieved.is_empty() {
         names.push((Mark::Ring, run, "achieved".to_owned()));
@@ -94,7 +94,7 @@ fn names_of(curves: &Curves, run: Color32) -> Vec<(Mark, Color32, String)> {
     names
 }
 
-/// How many of the errors lie within what was predicted.
+/// The number of errors within the predicted budget, in words.
 fn sentence(curves: &Curves) -> String {
     let budgets = curves.with.iter().map(|with| with[0].to_bits()).zip(&curves.with);
     let by_range: std::collections::HashMap<u64, &[f64; 2]> = budgets.collect();

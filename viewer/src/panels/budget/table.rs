@@ -7,16 +7,16 @@ use sightline_geometry::estimate::error_budget::{
 
 use crate::theme;
 
-/// What is odd in the printed table.
+/// The errata of the printed table.
 const ERRATA: &str = "These are the test bed's cameras, not those on Mars.\n\
     The table was computed with the maker's pixel of 4.65 µm; the text derives 4.69 µm (4.8 mm over 1024 pixels).\n\
     The printed 42.0 cm and 2.3 cm come from inputs that had been rounded: 41.9 and 2.2 cm come out.\n\
     The printed field of view of 49° × 37° does not follow from a lens of 6 mm: 43.3° × 33.1° does.";
 
-/// Two values agree when they differ by at most this, cm (R44).
+/// Largest difference of two values that agree, cm (R44).
 const AGREE_CM: f64 = 0.105;
 
-/// A row of the table: what it is, and how it is printed and computed, cm.
+/// A row of the table: its name, and its printed and computed values.
 struct Quantity {
     name: &'static str,
     printed_cm: fn(&TableOneRow) -> f64,
@@ -87,7 +87,7 @@ fn grid(ui: &mut Ui) {
     });
 }
 
-/// Printed, then computed with either pixel.
+/// The printed value, then the values computed with either pixel size.
 fn cells(ui: &mut Ui, row: &TableOneRow, quantity: &Quantity) {
     let printed_cm = (quantity.printed_cm)(row);
     ui.label(theme::number(format!("{printed_cm:.*}", quantity.digits)));
@@ -104,7 +104,7 @@ fn computed_cm(row: &TableOneRow, quantity: &Quantity, pixel_um: f64) -> f64 {
     (quantity.computed_m)(&row.pair(pixel_um).budget(&Approach::default())) * 100.0
 }
 
-/// The fields of view, deg.
+/// The row of the fields of view, deg.
 fn views(ui: &mut Ui) {
     ui.label(theme::label("field of view, °").size(12.0));
     for row in &TABLE_ONE {

@@ -1,4 +1,4 @@
-//! The residuals of the matches as a histogram, and how many matches agreed with each random draw (R164, R170).
+//! The residuals of the matches as a histogram, and the number of inliers of each RANSAC iteration (R164, R170).
 
 use egui::{Color32, Stroke, Ui, vec2};
 use egui_plot::{Bar, BarChart, HLine, LineStyle, MarkerShape, Plot, Points, VLine};
@@ -6,9 +6,9 @@ use sightline_track::locate::features::evidence::FittedMotion;
 use sightline_track::locate::features::rows::Feature;
 use sightline_track::locate::features::settings::MotionGate;
 
-use crate::drawing::overlay::{Line, Mark};
+use crate::drawing::overlay::{Mark, StrokeStyle};
 use crate::panels::chart::{few_marks, plain};
-use crate::panels::names;
+use crate::panels::chart_legend;
 use crate::state::State;
 use crate::theme;
 
@@ -16,27 +16,27 @@ use crate::theme;
 const HEIGHT: f32 = 104.0;
 /// Bars of the histogram up to the gate.
 const BARS_TO_GATE: usize = 10;
-/// Bars of the histogram; the last one holds whatever is larger.
+/// Bars of the histogram; the last one also counts all larger residuals.
 const BARS: usize = 30;
 
-/// How many residuals fall between equal steps, the last number being whatever is larger.
+/// Counts of residuals in bins of equal width; the last bin also counts all larger residuals.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Histogram {
-    /// Width of a step, m.
+    /// Width of a bin, m.
     pub(crate) step_m: f64,
-    /// Of the matches that agree with the motion.
+    /// Counts of inliers.
     pub(crate) inliers: [usize; BARS],
-    /// Of those that do not.
+    /// Counts of outliers.
     pub(crate) outliers: [usize; BARS],
 }
 
 impl Histogram {
-    /// The residuals of a step about the gate of its run.
+    /// The residuals of a step, binned by the gate of its run.
     pub(crate) fn of(state: &State, features: &[Feature]) -> Self {
         Self::new(features, gate_m(state))
     }
 
-    /// The residuals of `features` about a gate.
+    /// The residuals of `features`, binned by a gate.
     fn new(features: &[Feature], gate_m: f64) -> Self {
         let step_m = gate_m / BARS_TO_GATE as f64;
         let mut histogram = Self { step_m, inliers: [0; BARS], outliers: [0; BARS] };
@@ -49,7 +49,7 @@ impl Histogram {
     }
 }
 
-/// The distance of two points up to which a match agrees with the motion, m.
+/// The gate on the distance of two matched points, m; it bounds inliers with `MotionGate::Distance`.
 fn gate_m(state: &State) -> f64 {
     state.run_settings().features.motion_inlier_m
 }
@@ -65,13 +65,13 @@ pub(crate) fn residuals(ui: &mut Ui, state: &State, features: &[Feature]) {
     } else {
         format!("gate: {sigmas} σ of the two points, at no one distance")
     };
-    names::wrapped(
+    chart_legend::wrapped(
         ui,
         "residuals of matches, cm",
         &[
             (Mark::Dot, theme::inlier(), "inliers, filled".to_owned()),
             (Mark::Square, theme::outlier(), "outliers, outlined; the last bar: beyond".to_owned()),
-            (Mark::Stroke(Line::Dashed), theme::strong(), gate),
+            (Mark::Stroke(StrokeStyle::Dashed), theme::strong(), gate),
         ],
     );
     let histogram = Histogram::new(features, gate_m);
@@ -99,16 +99,16 @@ pub(crate) fn residuals(ui: &mut Ui, state: &State, features: &[Feature]) {
     });
 }
 
-/// Shows how many matches agreed with each draw of three.
+/// Shows the number of inliers of each RANSAC iteration.
 pub(crate) fn consensus(ui: &mut Ui, motion: &FittedMotion) {
     let best = motion.consensus_by_draw.iter().max().copied().unwrap_or_default();
     let title = format!("inliers by RANSAC iteration ({} iterations)", motion.consensus_by_draw.len());
-    names::wrapped(
+    chart_legend::wrapped(
         ui,
         &title,
         &[
             (Mark::Dot, theme::prediction(), format!("an iteration, best {best}")),
-            (Mark::Stroke(Line::Dashed), theme::inlier(), format!("in the end {}", motion.inliers)),
+            (Mark::Stroke(StrokeStyle::Dashed), theme::inlier(), format!("in the end {}", motion.inliers)),
         ],
     );
     let points: Vec<[f64; 2]> =
@@ -122,7 +122,7 @@ pub(crate) fn consensus(ui: &mut Ui, motion: &FittedMotion) {
     });
 }
 
-/// A plot that stays as it is.
+/// A plot without interaction.
 fn still(name: &'static str) -> Plot<'static> {
     Plot::new(name)
         .height(HEIGHT)

@@ -1,4 +1,4 @@
-//! What remained of the features from step to step, the earlier stops that were tried, and the motion (R169, R170).
+//! The number of features after each step of the tracker, the earlier stops that were tried, and the motion (R169, R170).
 
 use egui::{Grid, RichText, Ui};
 use sightline_track::locate::features::FeatureEvidence;
@@ -8,20 +8,20 @@ use crate::command::{Command, Stage};
 use crate::state::State;
 use crate::theme;
 
-/// A line of the counts: the step that it belongs to, what is counted, and how many.
-pub(crate) struct Line {
+/// A line of the counts.
+pub(crate) struct CountLine {
     /// The step.
     pub(crate) stage: Stage,
-    /// What is counted.
+    /// The counted quantity.
     pub(crate) words: String,
-    /// How many, with the share of what came before.
+    /// The count, with its share of the preceding count.
     pub(crate) count: String,
 }
 
-/// The counts in the order of the steps; those that were not reached are left out.
-pub(crate) fn lines(evidence: &FeatureEvidence) -> Vec<Line> {
+/// The counts in the order of the steps; steps that were not reached are omitted.
+pub(crate) fn lines(evidence: &FeatureEvidence) -> Vec<CountLine> {
     let mut lines = Vec::new();
-    let mut add = |stage, words: String, count: String| lines.push(Line { stage, words, count });
+    let mut add = |stage, words: String, count: String| lines.push(CountLine { stage, words, count });
     if let Some(found) = &evidence.detect {
         let words = "features, left and right".to_owned();
         add(Stage::DETECT, words, format!("{} and {}", found.left, found.right));
@@ -69,7 +69,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, evidence: &FeatureEvidence, out: 
     });
 }
 
-/// Shows the earlier stops from which a motion was measured.
+/// Shows the earlier stops that were tried as the reference of the motion.
 pub(crate) fn anchors(ui: &mut Ui, evidence: &FeatureEvidence) {
     ui.label(theme::title("earlier stops tried"));
     if evidence.anchors.is_empty() {
@@ -114,7 +114,7 @@ fn anchor(ui: &mut Ui, tried: &AnchorTried) {
     ui.end_row();
 }
 
-/// Shows the motion with its 1 σ, and how well it fits.
+/// Shows the motion with its 1σ, and its residuals.
 pub(crate) fn motion(ui: &mut Ui, evidence: &FeatureEvidence) {
     ui.label(theme::title("motion and its deviation"));
     let Some(motion) = &evidence.fit_motion else {
@@ -133,7 +133,7 @@ pub(crate) fn motion(ui: &mut Ui, evidence: &FeatureEvidence) {
     }
 }
 
-/// Three numbers, each with its 1 σ.
+/// Three numbers, each with its 1σ.
 fn row(ui: &mut Ui, name: &str, unit: &str, values: [f64; 3], sigmas: Option<([f64; 3], &str)>) {
     ui.label(theme::label(format!("{name}, {unit}")).size(12.0));
     for (i, value) in values.into_iter().enumerate() {
@@ -148,7 +148,7 @@ fn row(ui: &mut Ui, name: &str, unit: &str, values: [f64; 3], sigmas: Option<([f
     ui.end_row();
 }
 
-/// How well the motion fits, how it settled, and what it does to the target.
+/// The residuals of the motion and its correction of the target, then its successive refits.
 pub(crate) fn sentences(motion: &FittedMotion) -> [String; 2] {
     let mm = |m: f64| format!("{:.1} mm", m * 1000.0);
     let fit = format!(

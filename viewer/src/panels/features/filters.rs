@@ -1,4 +1,4 @@
-//! Which features are shown, here and on the images: by residual and by scale; and how long residuals are drawn.
+//! Filters of the features, here and on the images: by residual and by scale; and the magnification of residuals.
 
 use std::ops::RangeInclusive;
 
@@ -12,23 +12,23 @@ use crate::theme;
 
 /// Width of a slider, points.
 const SLIDER: f32 = 64.0;
-/// From this width on all sliders stand in one row, points.
+/// Minimum width at which all sliders are in one row, points.
 const ONE_ROW: f32 = 900.0;
 
-/// A quantity that is filtered.
+/// A filtered quantity.
 struct Filter {
     name: &'static str,
     unit: &'static str,
-    /// How many of the unit one of the filter's own is.
+    /// Number of display units in one unit of the filter.
     factor: f64,
-    /// Smallest step above zero, and the end beyond which everything passes.
+    /// Smallest step above zero, and the end of the slider, which applies no upper limit.
     range: [f64; 2],
 }
 
 const RESIDUAL: Filter = Filter { name: "residual", unit: "mm", factor: 1000.0, range: [0.1, 1000.0] };
 const SCALE: Filter = Filter { name: "scale", unit: "px", factor: 1.0, range: [0.1, 64.0] };
 
-/// Shows the sliders: in one row where there is room, else one below the other.
+/// Shows the sliders: in one row if the width suffices, else one below the other.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let mut view = state.feature_view;
     ui.spacing_mut().slider_width = SLIDER;
@@ -51,7 +51,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     }
 }
 
-/// How long residuals are drawn, and the way back to everything.
+/// The magnification of residuals, and the button that resets all filters.
 fn magnification(ui: &mut Ui, view: &mut FeatureView) {
     ui.spacing_mut().item_spacing.x = 5.0;
     ui.label(theme::label("residuals ×"));
@@ -66,7 +66,7 @@ fn magnification(ui: &mut Ui, view: &mut FeatureView) {
     }
 }
 
-/// Two sliders: from the least value that is shown to the largest.
+/// Two sliders: the smallest and the largest value shown.
 fn limits(ui: &mut Ui, filter: &Filter, [least, largest]: &mut [f64; 2]) {
     let end = filter.range[1];
     ui.spacing_mut().item_spacing.x = 5.0;
@@ -82,7 +82,7 @@ fn limits(ui: &mut Ui, filter: &Filter, [least, largest]: &mut [f64; 2]) {
     let response =
         ui.add(slider(&mut high, filter.range)).accessible_name(format!("largest {}", filter.name));
     if response.changed() {
-        // The end of the slider lets everything pass.
+        // The end of the slider applies no upper limit.
         *largest = if high >= end { f64::INFINITY } else { high / filter.factor };
         *least = least.min(*largest);
     }

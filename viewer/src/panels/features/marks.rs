@@ -1,40 +1,40 @@
-//! The features on the two images: circles as large as their scale, and what became of them (R170).
+//! The features on the two images: circles with the radius of their scale, and the outcome of their matching (R170).
 //!
 //! | mark | meaning |
 //! |---|---|
 //! | circle with a tick | a feature: its radius is the scale, the tick points along its orientation |
-//! | dot, solid line | a match that agrees with the motion, and from where it came |
-//! | cross, dashed line | a match that does not |
-//! | arrow | from where the motion puts the feature to where it was found, magnified |
-//! | small dots about the target | where the sets of the bootstrap put it |
+//! | dot, solid line | an inlier, and the line from its earlier pixel |
+//! | cross, dashed line | an outlier, and the line from its earlier pixel |
+//! | arrow | from the pixel predicted by the motion to the detected one, magnified |
+//! | small dots about the target | the target's positions in the bootstrap sets |
 
 use egui::{Color32, Stroke, vec2};
 use sightline_geometry::frames::Pixel;
 use sightline_track::locate::features::rows::{Feature, Matched};
 
 use crate::command::{Layer, Mode};
-use crate::drawing::overlay::{Line, Mark, Overlay, paint_mark};
+use crate::drawing::overlay::{Mark, Overlay, StrokeStyle, paint_mark};
 use crate::drawing::view2d::Canvas;
 use crate::panels::legend::Entry;
 use crate::state::State;
-use crate::tables::Kind;
+use crate::tables::MatchOutcome;
 use crate::theme;
 
-/// Half the size of the mark of a match, points: many of them stand close together.
+/// Half the size of the mark of a match, points: small, because many are close together.
 const REACH: f32 = 4.0;
-/// How near to a feature the pointer must be to read it, points.
+/// Largest distance of the pointer from a feature whose values are shown, points.
 const HOVER_REACH: f32 = 9.0;
 /// Length of the two strokes of an arrow's tip, points.
 const TIP: f32 = 4.0;
 
-/// What the legend of the left image lists of the features.
+/// The legend entries of the features in the left image.
 pub(crate) fn left_entries(state: &State) -> Vec<Entry> {
     let mut entries = kinds(state, "features with scale and orientation");
     let matched = state.feature_evidence().and_then(|e| e.match_features.as_ref());
     if let Some(matched) = matched.filter(|_| state.features().ready().is_some()) {
         let from = format!("from step {}", matched.from_step);
         let magnified = format!("residuals × {}", state.feature_view.magnification);
-        let (solid, dashed) = (Mark::Stroke(Line::Solid), Mark::Stroke(Line::Dashed));
+        let (solid, dashed) = (Mark::Stroke(StrokeStyle::Solid), Mark::Stroke(StrokeStyle::Dashed));
         entries.extend([
             Entry::new(Layer::Flow, solid, theme::inlier(), format!("inliers {from}")),
             Entry::new(Layer::OutlierFlow, dashed, theme::outlier(), format!("outliers {from}")),
@@ -48,39 +48,39 @@ pub(crate) fn left_entries(state: &State) -> Vec<Entry> {
     entries
 }
 
-/// What the legend of the right image lists of the features.
+/// The legend entries of the features in the right image.
 pub(crate) fn right_entries(state: &State) -> Vec<Entry> {
     kinds(state, "matches of features in the other image")
 }
 
-/// The three kinds with how many of each are shown.
+/// The three kinds with the number shown of each.
 fn kinds(state: &State, all: &str) -> Vec<Entry> {
     let Some(features) = state.features().ready() else { return Vec::new() };
-    let count = |kind: Kind| state.feature_view.count(features, kind);
+    let count = |kind: MatchOutcome| state.feature_view.count(features, kind);
     let mut entries = Vec::new();
     if features.iter().any(|feature| feature.matched.is_some()) {
-        let words = |kind: Kind, name: &str| format!("{name} {}", count(kind).words());
-        let word = words(Kind::Inlier, "inliers");
+        let words = |kind: MatchOutcome, name: &str| format!("{name} {}", count(kind).words());
+        let word = words(MatchOutcome::Inlier, "inliers");
         entries.push(Entry::new(Layer::Inliers, Mark::Dot, theme::inlier(), word));
-        let word = words(Kind::Outlier, "outliers");
+        let word = words(MatchOutcome::Outlier, "outliers");
         entries.push(Entry::new(Layer::Outliers, Mark::Cross, theme::outlier(), word));
     }
     entries.push(Entry::new(Layer::Keypoints, Mark::Ring, theme::keypoint(), all));
     entries
 }
 
-/// The layer and the looks of a kind.
-fn looks(kind: Kind) -> (Layer, Mark, Color32) {
+/// The layer, mark and colour of a kind.
+fn match_style(kind: MatchOutcome) -> (Layer, Mark, Color32) {
     match kind {
-        Kind::Unmatched => (Layer::Keypoints, Mark::Ring, theme::keypoint()),
-        Kind::Inlier => (Layer::Inliers, Mark::Dot, theme::inlier()),
-        Kind::Outlier => (Layer::Outliers, Mark::Cross, theme::outlier()),
+        MatchOutcome::Unmatched => (Layer::Keypoints, Mark::Ring, theme::keypoint()),
+        MatchOutcome::Inlier => (Layer::Inliers, Mark::Dot, theme::inlier()),
+        MatchOutcome::Outlier => (Layer::Outliers, Mark::Cross, theme::outlier()),
     }
 }
 
-/// Whether a feature has a mark: it passes the filters, and a layer that shows it is on.
+/// Whether a feature has a mark: it passes the filters, and a layer that contains it is shown.
 pub(crate) fn is_drawn(state: &State, feature: &Feature) -> bool {
-    let (layer, ..) = looks(Kind::of(feature));
+    let (layer, ..) = match_style(MatchOutcome::of(feature));
     (state.shows(layer) || state.shows(Layer::Keypoints)) && state.feature_view.shows(feature)
 }
 
@@ -94,9 +94,12 @@ pub(crate) fn paint_left(canvas: &Canvas, state: &State) {
     let overlay = Overlay::new(&canvas.painter, &canvas.transform);
     for feature in shown() {
         let Some(matched) = &feature.matched else { continue };
-        let (layer, mark, colour) = looks(Kind::of(feature));
-        let (flow, line) =
-            if matched.is_inlier { (Layer::Flow, Line::Solid) } else { (Layer::OutlierFlow, Line::Dashed) };
+        let (layer, mark, colour) = match_style(MatchOutcome::of(feature));
+        let (flow, line) = if matched.is_inlier {
+            (Layer::Flow, StrokeStyle::Solid)
+        } else {
+            (Layer::OutlierFlow, StrokeStyle::Dashed)
+        };
         if state.shows(flow) {
             overlay.thin_line(&[matched.then, feature.pixel], colour, line);
         }
@@ -115,11 +118,11 @@ pub(crate) fn paint_left(canvas: &Canvas, state: &State) {
     }
 }
 
-/// Paints the partners of the features in the right image.
+/// Paints the stereo matches of the features in the right image.
 pub(crate) fn paint_right(canvas: &Canvas, state: &State) {
     let features = state.features().ready().map_or(&[][..], Vec::as_slice);
     for feature in features.iter().filter(|feature| is_drawn(state, feature)) {
-        let (_, mark, colour) = looks(Kind::of(feature));
+        let (_, mark, colour) = match_style(MatchOutcome::of(feature));
         if let Some(pixel) = feature.right {
             dot(canvas, pixel, mark, colour);
         }
@@ -133,7 +136,7 @@ fn dot(canvas: &Canvas, pixel: Pixel, mark: Mark, colour: Color32) {
     }
 }
 
-/// A circle as large as the scale with a tick along the orientation; fainter where the feature became no point.
+/// A circle with the radius of the scale and a tick along the orientation; fainter if the feature was not triangulated.
 fn keypoint(canvas: &Canvas, feature: &Feature) {
     let at = canvas.transform.to_screen(feature.pixel);
     let radius = ((feature.sigma_px * canvas.transform.scale) as f32).max(1.5);
@@ -149,12 +152,15 @@ fn keypoint(canvas: &Canvas, feature: &Feature) {
     }
 }
 
-/// An arrow from where the motion puts a feature towards where it was found, magnified.
+/// An arrow from the pixel predicted by the motion towards the detected one, magnified.
 fn residual(canvas: &Canvas, feature: &Feature, matched: &Matched, magnification: f64) {
     let Some((moved, vector)) = matched.moved.zip(matched.residual_px(feature.pixel)) else { return };
     let end = moved.offset(vector.x * magnification, vector.y * magnification);
-    let (line, colour) =
-        if matched.is_inlier { (Line::Solid, theme::search()) } else { (Line::Dashed, theme::outlier()) };
+    let (line, colour) = if matched.is_inlier {
+        (StrokeStyle::Solid, theme::search())
+    } else {
+        (StrokeStyle::Dashed, theme::outlier())
+    };
     let overlay = Overlay::new(&canvas.painter, &canvas.transform);
     overlay.thin_line(&[moved, end], colour, line);
     let [from, tip] = [moved, end].map(|pixel| canvas.transform.to_screen(pixel));
@@ -166,7 +172,7 @@ fn residual(canvas: &Canvas, feature: &Feature, matched: &Matched, magnification
     }
 }
 
-/// Says what the feature under the pointer is; `place` is where it lies on this image.
+/// Describes the feature under the pointer; `place` returns a feature's pixel on this image.
 pub(crate) fn hover(canvas: &Canvas, state: &State, place: fn(&Feature) -> Option<Pixel>) {
     let Some(pointer) = canvas.response.hover_pos().filter(|_| state.mode == Mode::Look && state.marks)
     else {
@@ -187,7 +193,7 @@ pub(crate) fn hover(canvas: &Canvas, state: &State, place: fn(&Feature) -> Optio
     canvas.response.clone().on_hover_text_at_pointer(words(feature, from_step));
 }
 
-/// The numbers of a feature, a line each.
+/// The values of a feature, one a line.
 pub(crate) fn words(feature: &Feature, from_step: Option<usize>) -> String {
     let place = |pixel: Pixel| format!("{:.1}, {:.1}", pixel.x, pixel.y);
     let mut lines = vec![

@@ -1,7 +1,7 @@
-//! The feature tracker at one step: what it found and matched, which motion most of it agrees with, and how certain
-//! that is (R169, R170, R184).
+//! The feature tracker at one step: detected and matched features, the motion that most matches support, and its
+//! uncertainty (R169, R170, R184).
 //!
-//! The filters at the top act on the images as well.
+//! The filters at the top also apply to the images.
 
 pub(crate) mod charts;
 mod counts;
@@ -17,10 +17,10 @@ use crate::command::Command;
 use crate::panels::panel::{Panel, TableOf};
 use crate::panels::sheets;
 use crate::state::State;
-use crate::tables::Kind;
+use crate::tables::MatchOutcome;
 use crate::theme;
 
-/// From this width on tables and plots stand side by side, points.
+/// Minimum width at which tables and plots are side by side, points.
 const TWO_COLUMNS: f32 = 620.0;
 
 /// The panel “Features”.
@@ -40,7 +40,7 @@ impl Panel for Features {
     }
 }
 
-/// The feature tracker's evidence at the current step, once features were detected.
+/// The feature tracker's evidence at the current step; `None` until features were detected.
 fn detected(state: &State) -> Option<&FeatureEvidence> {
     state.feature_evidence().filter(|evidence| evidence.detect.is_some())
 }
@@ -86,13 +86,13 @@ fn draw_charts(ui: &mut Ui, state: &State, evidence: &FeatureEvidence, features:
     charts::consensus(ui, motion);
 }
 
-/// How many of each kind the filters let through.
+/// The number of features of each kind that pass the filters.
 fn shown(state: &State, features: &[Feature]) -> String {
-    let words = |kind: Kind| state.feature_view.count(features, kind).words();
+    let words = |kind: MatchOutcome| state.feature_view.count(features, kind).words();
     format!(
         "shown: {} inliers, {} outliers, {} features without a match",
-        words(Kind::Inlier),
-        words(Kind::Outlier),
-        words(Kind::Unmatched)
+        words(MatchOutcome::Inlier),
+        words(MatchOutcome::Outlier),
+        words(MatchOutcome::Unmatched)
     )
 }

@@ -1,7 +1,7 @@
-//! The template's history: the window that every step matched, and how the current view correlates with each earlier
+//! The template's history: the matched window of every step, and the correlation of the current view with each earlier
 //! template of the run (R72), which the server computes.
 //!
-//! Both are fetched while this panel is shown.
+//! Both are fetched only while this panel is visible.
 
 use egui::{Align2, Margin, Rect, ScrollArea, Sense, Ui, UiBuilder, pos2, vec2};
 use egui_plot::{GridMark, Line, MarkerShape, Plot, Points};
@@ -13,7 +13,7 @@ use sightline_track::settings::TrackerKind;
 use crate::cache::Slot;
 use crate::command::{Command, Go};
 use crate::drawing::{decimate, view2d};
-use crate::panels::chart::{few_marks, pieces, plain};
+use crate::panels::chart::{few_marks, plain, polylines};
 use crate::panels::pane::Need;
 use crate::panels::panel::{Panel, TableOf};
 use crate::panels::sheets;
@@ -22,9 +22,9 @@ use crate::theme;
 
 /// Width of the two plots, points.
 const PLOTS: f32 = 330.0;
-/// Room for the lines of words above and below a window, points.
+/// Heights of the text above and below a window, points.
 const WORDS: (f32, f32) = (14.0, 26.0);
-/// Least width of a frame, points: its words must fit.
+/// Minimum width of a frame, in which its text fits, points.
 const FRAME: f32 = 76.0;
 
 /// The panel “Template history”.
@@ -56,7 +56,7 @@ impl Panel for History {
     }
 }
 
-/// Shows strip and plots.
+/// Shows the strip and the plots.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let Some(run) = state.run() else { return };
     let area = ui.available_rect_before_wrap();
@@ -92,7 +92,7 @@ fn strip(ui: &mut Ui, state: &State, run: &RunView, out: &mut Vec<Command>) {
     });
 }
 
-/// Scale and roll, then the score, of a step.
+/// Scale and roll of a step, then its score.
 fn words_of(run: &RunView, row: &StepRow) -> [String; 2] {
     if is_pick(run, row) {
         return ["as designated".to_owned(), String::new()];
@@ -145,7 +145,7 @@ fn state_is_lost(row: &StepRow) -> bool {
     crate::state::state_of(row).is_lost()
 }
 
-/// The current view against every earlier template: score and shift.
+/// The current view compared with every earlier template: score and shift.
 fn comparisons(ui: &mut Ui, state: &State, run: &RunView) {
     let found = state.earlier_templates().ready().unwrap_or_default();
     ui.add(egui::Label::new(theme::note(sentence(state, found))).truncate());
@@ -215,10 +215,10 @@ fn chart(
             })
             .label_formatter(|_| None);
         plot.show(ui, |plot| {
-            for piece in pieces(points) {
-                plot.line(Line::new("", piece.clone()).color(colour).width(1.5));
+            for polyline in polylines(points) {
+                plot.line(Line::new("", polyline.clone()).color(colour).width(1.5));
                 plot.points(
-                    Points::new("", decimate::marks(piece))
+                    Points::new("", decimate::marks(polyline))
                         .color(colour)
                         .radius(2.5)
                         .shape(MarkerShape::Circle),

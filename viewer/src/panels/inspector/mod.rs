@@ -1,4 +1,4 @@
-//! The inspector: the quantities that the selected stage declares, then the rest of its evidence as a tree.
+//! The inspector: the declared quantities of the selected stage, then the rest of its evidence as a tree.
 
 mod motion;
 mod quantities;
@@ -12,8 +12,8 @@ use sightline_session::records;
 use sightline_session::step::RunStep;
 use sightline_track::settings::TrackerKind;
 
-use self::tree::Place;
-use crate::command::{Command, Extent, Stage};
+use self::tree::EvidencePath;
+use crate::command::{Command, Stage, StageBarExtent};
 use crate::compare::panel::readouts;
 use crate::panels::panel::Panel;
 use crate::state::State;
@@ -34,7 +34,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         ui.label(RichText::new(state.stage().word()).strong().color(theme::strong()));
         ui.label(theme::note(state.stage().question()));
     });
-    // The line keeps its place before the times are here.
+    // The line is shown, empty, before the times are loaded, so that the rest does not move.
     ui.label(theme::note(times::line(state).unwrap_or_default())).on_hover_text(times::HELP);
     if state.stage().is_of_drive() {
         driving::stages::show(ui, state);
@@ -73,17 +73,17 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 /// A stage of the record.
 type RecordedStage = &'static sightline_record::Stage<RunStep>;
 
-/// The stages of the record that a stage of the bar shows, those that were reached: its own first, then those that have
-/// no place of their own in the bar of the tracker.
+/// The reached stages of the record that a stage of the bar shows: its own first, then those that have no entry of their
+/// own in the tracker's bar.
 fn recorded(trace: &RunStep, stage: Stage) -> Vec<RecordedStage> {
     let tracker = trace.located().map_or_else(TrackerKind::default, |l| l.evidence.tracker());
     let mut of = Stage::PREDICT;
     let mut shown: Vec<RecordedStage> = Vec::new();
     for recorded in records::stages().iter().filter(|recorded| is_in_bar(recorded)) {
         let word = recorded.schema().stage.as_ref();
-        let own = Stage::bar(tracker, Extent::Odometry).find(|stage| stage.word() == word);
+        let own = Stage::bar(tracker, StageBarExtent::Odometry).find(|stage| stage.word() == word);
         of = own.unwrap_or(if of.is_step_of_locate() { of } else { Stage::LOCATE });
-        // `detect` counts the results of its next two steps.
+        // `detect` records the counts of its next two steps.
         let counts = matches!(stage, Stage::MATCH_FEATURES | Stage::TRIANGULATE) && of == Stage::DETECT;
         if (of == stage || counts) && recorded.is_reached(trace) {
             shown.push(recorded);
@@ -93,7 +93,8 @@ fn recorded(trace: &RunStep, stage: Stage) -> Vec<RecordedStage> {
     shown
 }
 
-/// Whether a stage of the record belongs to one of the bar: the row repeats others, and the truth is shown with all.
+/// Whether a stage of the record is shown with a stage of the bar: the row repeats others, and the truth is shown with
+/// all.
 fn is_in_bar(stage: &sightline_record::Stage<RunStep>) -> bool {
     let schema = stage.schema();
     !schema.path.is_empty() && schema.stage != "truth"
@@ -102,7 +103,7 @@ fn is_in_bar(stage: &sightline_record::Stage<RunStep>) -> bool {
 /// The quantities of a stage, then the rest of its evidence.
 fn section(ui: &mut Ui, trace: &RunStep, stage: RecordedStage, out: &mut Vec<Command>) {
     quantities::show(ui, trace, stage, out);
-    let place = Place { stage, path: String::new(), step: trace.step };
+    let place = EvidencePath { stage, path: String::new(), step: trace.step };
     tree::entries(ui, &place, &records::rest(stage, trace), out);
 }
 
@@ -129,7 +130,7 @@ fn not_reached(trace: &RunStep, state: &State) -> String {
 /// Whether a stage was reached.
 pub(crate) fn is_reached(trace: &RunStep, stage: Stage) -> bool {
     match stage {
-        // The evidence of the registration exists before its refinement has an end.
+        // The registration has evidence before its refinement has finished.
         Stage::REFINE_REGISTER => trace
             .shape()
             .and_then(|evidence| evidence.registration.as_ref())

@@ -1,4 +1,4 @@
-//! The change of the pose estimate at `predict`: each axis with its σ and, where the truth is known, its error.
+//! The change of the pose estimate at `predict`: each axis with its σ and, if the truth is known, its error.
 
 use egui::{Grid, RichText, Ui};
 use sightline_session::why::pose_change::AXES;
@@ -8,7 +8,7 @@ use crate::panels::numbers;
 use crate::state::State;
 use crate::theme;
 
-/// An error of so many standard deviations is marked.
+/// Errors larger than this number of standard deviations are highlighted.
 const SIGMAS: f64 = 3.0;
 
 /// Shows the change; nothing at the first stop.
@@ -17,7 +17,7 @@ pub(super) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ui.horizontal_wrapped(|ui| {
         let link = ui.link(theme::title("pose change since the stop before"));
         let link = link.on_hover_text("Odometry of this step, in the rover frame of the stop before");
-        numbers::ask(&link, state.cursor.step, "pose_change", "", out);
+        numbers::explain_on_click(&link, state.cursor.step, "pose_change", "", out);
     });
     Grid::new("pose change").num_columns(4).spacing([12.0, 1.0]).show(ui, |ui| {
         for head in ["", "estimate", "1σ", if error.is_some() { "error" } else { "" }] {
@@ -42,7 +42,7 @@ pub(super) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 /// A length in cm or an angle in degrees.
 fn value(value: f64, unit: &str) -> String {
     let (value, unit) = if unit == "m" { (100.0 * value, " cm") } else { (value, "°") };
-    // Without the sign of a zero.
+    // Zero has no sign.
     let value = if value.abs() < 0.005 { 0.0 } else { value };
     if value == 0.0 { format!("0.00{unit}") } else { format!("{value:+.2}{unit}") }
 }

@@ -1,4 +1,5 @@
-//! The quantities of a stage that have a value: name, value, unit and formula of each, with a link to the explanation of its value.
+//! The quantities of a stage that have a value: name, value, unit and formula, with a link to the explanation of the
+//! value.
 
 use egui::{RichText, Ui};
 use sightline_record::{Kind, Quantity, Unit, Value as Recorded, label};
@@ -9,7 +10,7 @@ use crate::command::Command;
 use crate::panels::{digits, numbers};
 use crate::theme;
 
-/// Shows the quantities of a stage that have a value, those of a part under its title; then the names of those without.
+/// Shows the quantities of a stage that have a value, grouped by part; then the names of those without.
 pub(super) fn show(ui: &mut Ui, trace: &RunStep, stage: RecordedStage, out: &mut Vec<Command>) {
     let schema = stage.schema();
     let all: Vec<(&Quantity, Recorded)> =
@@ -49,7 +50,7 @@ fn group_of(name: &str) -> &str {
     name.split_once('.').map_or("", |(group, _)| group)
 }
 
-/// A quantity: its name, which leads to its origin, and its value with unit and formula.
+/// A quantity: its name, which links to its origin, and its value with unit and formula.
 fn show_quantity(
     ui: &mut Ui,
     step: usize,
@@ -63,7 +64,7 @@ fn show_quantity(
         help += &format!("\n= {}", theme::formula(&quantity.formula));
     }
     let link = ui.link(RichText::new(quantity.label.as_ref()).size(12.0)).on_hover_text(help);
-    numbers::ask(&link, step, name, &words, out);
+    numbers::explain_on_click(&link, step, name, &words, out);
     ui.vertical(|ui| {
         let unit = quantity.unit_label();
         match matrix_of(quantity.kind, value) {
@@ -83,7 +84,7 @@ fn show_quantity(
                 });
             }
         }
-        // On lines of its own: a text that is broken beside the value would reach into the next row of the table.
+        // On its own lines: a formula that wraps beside the value would extend into the next row of the table.
         if !quantity.formula.is_empty() {
             let formula = format!("= {}", theme::formula(&quantity.formula));
             ui.add(egui::Label::new(theme::note(formula)).wrap());
@@ -115,12 +116,12 @@ pub(super) fn with_degrees(number: f64, unit: Unit) -> String {
     }
 }
 
-/// A coordinate in an image: hundredths of a pixel, also far from the origin.
+/// An image coordinate: two decimals, also far from the origin.
 fn coordinate(value: f64) -> String {
     if value.abs() >= 10.0 && value.fract() != 0.0 { format!("{value:.2}") } else { digits(value) }
 }
 
-/// The rows of a matrix.
+/// The rows of a matrix; `None` for other kinds of values.
 fn matrix_of(kind: Kind, value: &Recorded) -> Option<Vec<Vec<f64>>> {
     let Recorded::Components(parts) = value else { return None };
     let at = |rows: &[&[usize]]| -> Option<Vec<Vec<f64>>> {
@@ -154,7 +155,7 @@ pub(super) fn matrix(ui: &mut Ui, rows: &[Vec<f64>]) {
     });
 }
 
-/// The names of the axes of a matrix with so many rows or columns.
+/// The names of the axes of a matrix with `count` rows or columns.
 fn axes(count: usize) -> &'static [&'static str] {
     const ALL: [&str; 6] = ["x", "y", "z", "roll", "pitch", "yaw"];
     &ALL[..count.min(ALL.len())]

@@ -1,15 +1,15 @@
-//! What the selected stage and the whole stop take, on Mars and here.
+//! The times of the selected stage and of the whole stop, on the flight processor and on this server.
 
 use sightline_session::times::StageTime;
 use sightline_track::cycle_stage::CycleStage;
 
 use crate::state::State;
 
-/// What the line means.
+/// The help of the line.
 pub(super) const HELP: &str = "On Mars: by the model of the flown processor of 20 MHz, with the transfer of the images and the drive. Here: \
      as measured when this server computed the step.";
 
-/// The line of the cursor's step; `None` before the times are here.
+/// The line for the cursor's step; `None` until the times are loaded.
 pub(super) fn line(state: &State) -> Option<String> {
     let times = state.step_key(state.cursor.step).and_then(|key| state.cache.times(&key))?;
     Some(words(times, state.stage().in_cycle()))
@@ -34,7 +34,7 @@ fn milliseconds(time_s: f64) -> String {
     format!("{} ms", short(1e3 * time_s))
 }
 
-/// Tenths below ten, whole numbers from there on.
+/// One decimal below ten, none from there on.
 fn short(value: f64) -> String {
     if value < 9.95 { format!("{value:.1}") } else { format!("{value:.0}") }
 }

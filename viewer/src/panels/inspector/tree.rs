@@ -1,4 +1,4 @@
-//! The evidence of a stage that is no declared quantity, as a tree: plain values first, then nested records and lists.
+//! The evidence of a stage that is not a declared quantity, as a tree: plain values first, then nested records and lists.
 
 use egui::{CollapsingHeader, RichText, Ui};
 use serde_json::Value;
@@ -11,8 +11,8 @@ use crate::command::Command;
 use crate::panels::{digits, numbers};
 use crate::theme;
 
-/// Where an entry is in the evidence of a stage.
-pub(super) struct Place {
+/// The position of an entry in the evidence of a stage.
+pub(super) struct EvidencePath {
     /// The stage.
     pub(super) stage: RecordedStage,
     /// Names of fields with dots between; empty for the evidence itself.
@@ -21,27 +21,27 @@ pub(super) struct Place {
     pub(super) step: usize,
 }
 
-impl Place {
-    /// The place of a field.
+impl EvidencePath {
+    /// The position of a field.
     fn field(&self, key: &str) -> Self {
         let dot = if self.path.is_empty() { "" } else { "." };
         Self { path: format!("{}{dot}{key}", self.path), ..*self }
     }
 
-    /// The name by which Why explains it.
-    fn asked(&self) -> String {
+    /// The name by which the panel “Why” explains it.
+    fn explained_name(&self) -> String {
         format!("{}.{}", self.stage.schema().stage, self.path)
     }
 
-    /// The unit that the stage declares, else that of the field's name or of the kind of its value.
+    /// The unit that the stage declares, else the unit of the value's kind.
     fn unit(&self, value: &Value) -> Unit {
         let found = records::unit_at(&format!("{}.{}", self.stage.schema().path, self.path));
         found.unwrap_or(if records::is_pixel(value) { Unit::Pixel } else { Unit::One })
     }
 }
 
-/// The fields of a record, plain values first.
-pub(super) fn entries(ui: &mut Ui, at: &Place, record: &Value, out: &mut Vec<Command>) {
+/// Shows the fields of a record, plain values first.
+pub(super) fn entries(ui: &mut Ui, at: &EvidencePath, record: &Value, out: &mut Vec<Command>) {
     let Some(fields) = record.as_object() else {
         ui.label(theme::number(record.to_string()));
         return;
@@ -71,29 +71,29 @@ pub(super) fn entries(ui: &mut Ui, at: &Place, record: &Value, out: &mut Vec<Com
         let header = format!("{}{count} {}", label(key, unit), unit_label(key, unit));
         let header = RichText::new(header.trim_end().to_owned()).size(12.0).color(theme::text());
         CollapsingHeader::new(header).id_salt(key).default_open(is_small(key, value)).show(ui, |ui| {
-            if why::is_explained(&at.asked()) {
+            if why::is_explained(&at.explained_name()) {
                 let link = ui.link(RichText::new("why").small());
-                numbers::ask(&link, at.step, &at.asked(), &value.to_string(), out);
+                numbers::explain_on_click(&link, at.step, &at.explained_name(), &value.to_string(), out);
             }
             children(ui, &at, key, value, out);
         });
     }
 }
 
-/// The name of an entry; where its origin is known, a link to it.
-fn name_of(ui: &mut Ui, at: &Place, name: &str, value: &str, out: &mut Vec<Command>) {
-    if why::is_explained(&at.asked()) {
+/// The name of an entry, with a link to its origin if that is explained.
+fn name_of(ui: &mut Ui, at: &EvidencePath, name: &str, value: &str, out: &mut Vec<Command>) {
+    if why::is_explained(&at.explained_name()) {
         let link = ui.link(RichText::new(name).size(12.0));
-        numbers::ask(&link, at.step, &at.asked(), value, out);
+        numbers::explain_on_click(&link, at.step, &at.explained_name(), value, out);
     } else {
         ui.label(theme::label(name).size(12.0));
     }
 }
 
-fn children(ui: &mut Ui, at: &Place, key: &str, value: &Value, out: &mut Vec<Command>) {
+fn children(ui: &mut Ui, at: &EvidencePath, key: &str, value: &Value, out: &mut Vec<Command>) {
     match value {
         Value::Array(list) if is_matrix(key, value) => {
-            // Written as one list, column by column.
+            // Serialised as one list, column by column.
             let side = list.len().isqrt();
             let at = |row: usize, column: usize| list[column * side + row].as_f64().unwrap_or(f64::NAN);
             let row = |row: usize| (0..side).map(|column| at(row, column)).collect();
@@ -127,7 +127,7 @@ fn is_empty(value: &Value) -> bool {
     }
 }
 
-/// Whether a record is short enough to be open from the start.
+/// Whether a record is short enough to be open initially.
 fn is_small(key: &str, value: &Value) -> bool {
     match value {
         Value::Array(_) => is_matrix(key, value),
@@ -145,7 +145,7 @@ fn is_matrix(key: &str, value: &Value) -> bool {
             .is_some_and(|list| matches!(list.len(), 4 | 9 | 36) && list.iter().all(Value::is_number))
 }
 
-/// A value that fits on a line; none for records and long lists.
+/// A value that fits on a line; `None` for records and long lists.
 fn words(key: &str, value: &Value) -> Option<String> {
     match value {
         Value::Bool(is) => Some(if *is { "yes" } else { "no" }.to_owned()),
@@ -187,7 +187,7 @@ mod tests {
 
     #[test]
     fn units_of_fields_are_declared_or_in_their_names() {
-        let at = |stage: &str, path: &str| Place {
+        let at = |stage: &str, path: &str| EvidencePath {
             stage: records::stage(stage).unwrap(),
             path: path.to_owned(),
             step: 0,

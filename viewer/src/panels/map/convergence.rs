@@ -1,8 +1,8 @@
-//! Successive positions of the target in the site frame, each with its 3 σ ellipse, converging to the last one (R139).
+//! Successive positions of the target in the site frame, each with its 3σ ellipse, converging to the last one (R139).
 //!
-//! Seen from above and drawn about the last position, in centimetres. The ellipse is that of the horizontal part of
-//! the covariance, turned from the rover frame into the site frame: `R Σ Rᵀ`; stereo makes it shrink with the square
-//! of the range.
+//! Seen from above and relative to the last position, in centimetres. The ellipse is that of the horizontal part of the
+//! covariance, rotated from the rover frame into the site frame: `R Σ Rᵀ`; with stereo it shrinks with the square of the
+//! range.
 
 use egui::{Align2, Color32, Ui, vec2};
 use egui_plot::{Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotUi, Points, Polygon, Text};
@@ -12,7 +12,7 @@ use sightline_geometry::frames::Point3;
 use sightline_session::step::StepRow;
 use sightline_session::view::RunView;
 
-use crate::compare::state::{Look, Other};
+use crate::compare::state::{Other, RunStyle};
 use crate::drawing::{decimate, ellipse};
 use crate::panels::chart::shape;
 use crate::panels::map::site::{in_site, on_map, truth_in_site};
@@ -20,30 +20,30 @@ use crate::panels::numbers::fixed;
 use crate::state::State;
 use crate::theme;
 
-/// The view reaches at least this far to either side, cm: no smaller error is worth magnifying.
+/// Minimum half width of the view, cm: smaller errors are not worth magnifying.
 const LEAST_HALF_CM: f64 = 0.5;
 
-/// Where a step placed the target.
+/// A step's estimate of the target position.
 pub(crate) struct Position {
     /// The step.
     pub step: usize,
     /// The position in the site frame, m.
     pub point_in_site: Point3,
-    /// Its covariance seen from above, m²: east, north; none where it is not finite.
+    /// Its horizontal covariance (east, north), m²; `None` if not finite.
     pub from_above: Option<Matrix2<f64>>,
 }
 
-/// The positions of a run, step by step.
+/// The positions of a run, in the order of its steps.
 pub(crate) fn positions(run: &RunView, stops: &[StopView]) -> Vec<Position> {
     run.rows.iter().filter_map(|row| position(row, stops)).collect()
 }
 
-/// As many of them as a map shows.
+/// The positions that a map shows, evenly decimated.
 pub(crate) fn shown(run: &RunView, stops: &[StopView]) -> Vec<Position> {
     decimate::evenly(&run.rows, decimate::PLACES).filter_map(|row| position(row, stops)).collect()
 }
 
-/// Where a step placed the target.
+/// A step's estimate of the target position; `None` if the step has no stop.
 fn position(row: &StepRow, stops: &[StopView]) -> Option<Position> {
     let site_from_rover = stops.get(row.step)?.site_from_rover.to_pose();
     let rotation = *site_from_rover.rotation.to_rotation_matrix().matrix();
@@ -84,14 +84,14 @@ pub(crate) fn show(ui: &mut Ui, state: &State, stops: &[StopView], run: &RunView
     plot.show(ui, |plot| paint(plot, state, (run, &positions, here.as_ref()), origin));
 }
 
-/// Where the bootstrap of the cursor's step puts the target, in the site frame.
+/// The target's positions in the bootstrap sets of the cursor's step, in the site frame, m.
 fn cloud_in_site(state: &State) -> impl Iterator<Item = Point3> {
     let pose = state.stop().map(|stop| stop.site_from_rover.to_pose());
     let cloud = state.cloud().ready().map_or(&[][..], Vec::as_slice);
     pose.into_iter().flat_map(|pose| cloud.iter().map(move |point| pose * point.position_in_rover))
 }
 
-/// How the ellipses shrank, in words.
+/// The 3σ half axes at the pick, now and at the end, in words.
 fn sentence(positions: &[Position], here: Option<&Position>) -> String {
     let width = |at: Option<&Position>| {
         at.and_then(long_axis_cm).map_or_else(|| "none".to_owned(), |cm| format!("{cm:.1}"))
@@ -101,16 +101,21 @@ fn sentence(positions: &[Position], here: Option<&Position>) -> String {
     format!("3σ (cm): at pick {first}{here} · at end {last}")
 }
 
-/// The longer half axis of the 3 σ ellipse, cm.
+/// The longer half axis of the 3σ ellipse, cm.
 fn long_axis_cm(at: &Position) -> Option<f64> {
     let [long, _] = ellipse::axes(at.from_above.as_ref()?)?;
     Some(300.0 * long.norm())
 }
 
 /// A run's positions and the cursor's.
-type Shown<'a> = (&'a RunView, &'a [Position], Option<&'a Position>);
+type PlottedPositions<'a> = (&'a RunView, &'a [Position], Option<&'a Position>);
 
-fn paint(plot: &mut PlotUi<'_>, state: &State, (run, positions, here): Shown<'_>, origin: [f64; 2]) {
+fn paint(
+    plot: &mut PlotUi<'_>,
+    state: &State,
+    (run, positions, here): PlottedPositions<'_>,
+    origin: [f64; 2],
+) {
     let colour = theme::run(run.number);
     let place = |point: &Point3| {
         let [east, north] = on_map(point);
@@ -127,7 +132,7 @@ fn paint(plot: &mut PlotUi<'_>, state: &State, (run, positions, here): Shown<'_>
     );
     let count = positions.len().clamp(2, decimate::ELLIPSES) as f32 - 1.0;
     for (i, at) in decimate::evenly(positions, decimate::ELLIPSES).enumerate() {
-        // Later ellipses are stronger; the cursor's is the thick one.
+        // Later ellipses are stronger; that of the cursor's step has a thick line.
         let strength = 0.4 + 0.6 * i as f32 / count;
         if here.is_none_or(|here| here.step != at.step) {
             outline(plot, at, place(&at.point_in_site), colour.gamma_multiply(strength), 1.0);
@@ -143,7 +148,7 @@ fn paint(plot: &mut PlotUi<'_>, state: &State, (run, positions, here): Shown<'_>
         plot.text(Text::new("", PlotPoint::new(east, north), words).anchor(Align2::LEFT_BOTTOM));
     }
     for other in state.others() {
-        paint_other(plot, &positions_of(&other, state), other.look, place);
+        paint_other(plot, &positions_of(&other, state), other.style, place);
     }
     if let Some((truth, _)) = truth_in_site(state) {
         let points = Points::new("", place(&truth)).color(theme::truth()).radius(6.0);
@@ -151,26 +156,31 @@ fn paint(plot: &mut PlotUi<'_>, state: &State, (run, positions, here): Shown<'_>
     }
 }
 
-/// Where a compared run placed the target.
+/// The target positions of a compared run.
 fn positions_of(other: &Other<'_>, state: &State) -> Vec<Position> {
     state.traverse.as_ref().map_or_else(Vec::new, |traverse| shown(other.run, &traverse.stops))
 }
 
 /// The trail of a compared run with its last ellipse.
-fn paint_other(plot: &mut PlotUi<'_>, all: &[Position], look: Look, place: impl Fn(&Point3) -> [f64; 2]) {
+fn paint_other(
+    plot: &mut PlotUi<'_>,
+    all: &[Position],
+    style: RunStyle,
+    place: impl Fn(&Point3) -> [f64; 2],
+) {
     let trail: Vec<[f64; 2]> = all.iter().map(|at| place(&at.point_in_site)).collect();
     for piece in decimate::path(&trail) {
-        plot.line(Line::new("", piece).color(look.colour.gamma_multiply(0.6)).width(1.0));
+        plot.line(Line::new("", piece).color(style.colour.gamma_multiply(0.6)).width(1.0));
     }
     plot.points(
-        Points::new("", decimate::marks(trail)).color(look.colour).radius(2.5).shape(shape(look.mark)),
+        Points::new("", decimate::marks(trail)).color(style.colour).radius(2.5).shape(shape(style.mark)),
     );
     if let Some(last) = all.last() {
-        outline(plot, last, place(&last.point_in_site), look.colour, 1.5);
+        outline(plot, last, place(&last.point_in_site), style.colour, 1.5);
     }
 }
 
-/// The 3 σ ellipse of a position.
+/// The 3σ ellipse of a position.
 fn outline(plot: &mut PlotUi<'_>, at: &Position, centre_cm: [f64; 2], colour: Color32, width: f32) {
     let Some(outline) = at.from_above.as_ref().and_then(|covariance| ellipse::outline(covariance, 3.0))
     else {
@@ -192,7 +202,7 @@ mod tests {
         let state = fixture::at_step(&egui::Context::default(), 2);
         let mut stops = state.traverse.as_ref().unwrap().stops.clone();
         let mut run = state.run().unwrap().clone();
-        // A rover that heads east: its forward axis, along which the target is uncertain, is the map's east.
+        // For a rover that heads east, its forward axis, along which the target is uncertain, is the map's east.
         let heading = nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.0, std::f64::consts::FRAC_PI_2);
         let pose = sightline_geometry::frames::Pose::from_parts(Default::default(), heading);
         stops[0].site_from_rover = sightline_geometry::frames::PoseRecord::from(&pose);

@@ -1,10 +1,10 @@
 //! The map: the rover's path and the target's trail in the site frame, seen from above, north up.
 //!
 //! Site frame: +x north, +y east, +z down. On the map east is to the right, so a site point is drawn at (y, x).
-//! Beside the whole drive stands the target's neighbourhood, where the positions converge (`convergence`).
+//! The target's neighbourhood, where the positions converge, is shown beside the whole drive (`convergence`).
 
 pub(crate) mod convergence;
-mod pointed;
+mod hovered;
 mod site;
 
 use egui::{Color32, Rect, Ui, UiBuilder, vec2};
@@ -17,20 +17,20 @@ use crate::command::{Command, Go};
 use crate::drawing::decimate;
 use crate::drawing::overlay;
 use crate::drawing::overlay::Mark;
+use crate::hovered::Hovered;
+use crate::panels::chart_legend;
 use crate::panels::map::site::{in_site, on_map, truth_in_site};
-use crate::panels::names;
 use crate::panels::numbers::fixed;
 use crate::panels::pane::Need;
 use crate::panels::panel::{Panel, TableOf};
 use crate::panels::sheets;
-use crate::pointed::Pointed;
 use crate::state::{State, run_letter};
 use crate::{driving, theme};
 
-/// How near to a stop a click must be to go there, points.
+/// Largest distance from a stop at which a click selects it, points.
 const CLICK_REACH: f32 = 14.0;
 
-/// Height of the panel from which the rows of names are shown; below it the map has all room, points.
+/// Panel height from which the rows of names are shown, points.
 const NAMES_FROM: f32 = 190.0;
 
 /// Room between the two maps, points.
@@ -67,14 +67,14 @@ fn driven(state: &State) -> Option<&[StopView]> {
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let Some(stops) = driven(state) else { return };
     if ui.available_height() >= NAMES_FROM {
-        names::wrapped(ui, "", &names_of(state, stops));
+        chart_legend::wrapped(ui, "", &names_of(state, stops));
     }
     let run = state.run().filter(|run| !run.rows.is_empty());
     let Some(run) = run else {
         drive(ui, state, stops, None, out);
         return;
     };
-    // The drive keeps its shape, so that a long narrow one takes a strip; the target's neighbourhood gets the rest.
+    // The drive keeps its aspect ratio, so that a long narrow one takes a strip; the target's neighbourhood gets the rest.
     let area = ui.available_rect_before_wrap();
     let (first, second) = split(area, aspect(stops, run));
     let part = |rect: Rect, salt: &str| UiBuilder::new().max_rect(rect).id_salt(salt.to_owned());
@@ -84,7 +84,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ui.advance_cursor_after_rect(area);
 }
 
-/// Width over height of what the map of the drive must hold.
+/// Width over height of the extent of the drive's map: path and trail.
 fn aspect(stops: &[StopView], run: &RunView) -> f32 {
     let path = poses(stops, |stop| Some(stop.site_from_rover));
     let trail = convergence::shown(run, stops).into_iter().map(|at| on_map(&at.point_in_site));
@@ -96,7 +96,7 @@ fn aspect(stops: &[StopView], run: &RunView) -> f32 {
     (side(0).max(0.1) / side(1).max(0.1)) as f32
 }
 
-/// The drive's part and the target's: side by side where the drive is narrow, one above the other where it is wide.
+/// The drive's part and the target's: side by side if the drive is narrow, one above the other if it is wide.
 fn split(area: Rect, width_by_height: f32) -> (Rect, Rect) {
     if width_by_height * area.height() <= area.width() {
         let share = (width_by_height * area.height() / area.width() * 1.3 + 0.12).clamp(0.3, 0.5);
@@ -125,7 +125,7 @@ fn drive(ui: &mut Ui, state: &State, stops: &[StopView], run: Option<&RunView>, 
         if let Some(run) = run {
             paint_trail(plot, stops, run, theme::run(run.number));
             for other in state.others() {
-                paint_trail(plot, stops, other.run, other.look.colour);
+                paint_trail(plot, stops, other.run, other.style.colour);
             }
         }
         driving::map::paint(plot, state);
@@ -135,27 +135,31 @@ fn drive(ui: &mut Ui, state: &State, stops: &[StopView], run: Option<&RunView>, 
         }
         nearest_stop(plot, stops)
     });
-    pointed::paint(ui, state, stops, &response.transform);
+    hovered::paint(ui, state, stops, &response.transform);
     if let Some(step) = response.inner {
-        out.push(Command::Point(Pointed::Step(step)));
+        out.push(Command::Hover(Hovered::Step(step)));
         if response.response.clicked() {
             out.push(Command::Go(Go::Step(step)));
         }
     }
 }
 
-/// What the row above the map names.
+/// The names in the row above the map.
 fn names_of(state: &State, stops: &[StopView]) -> Vec<(Mark, Color32, String)> {
-    let mut names = vec![(Mark::Stroke(overlay::Line::Solid), theme::weak(), "path".to_owned())];
+    let mut names = vec![(Mark::Stroke(overlay::StrokeStyle::Solid), theme::weak(), "path".to_owned())];
     if stops.iter().any(|stop| stop.true_site_from_rover.is_some()) {
-        names.push((Mark::Stroke(overlay::Line::Dotted), theme::truth(), "true".to_owned()));
+        names.push((Mark::Stroke(overlay::StrokeStyle::Dotted), theme::truth(), "true".to_owned()));
     }
     if let Some(run) = state.run() {
         let name = format!("target, run {}", run_letter(run.number));
         names.push((Mark::Diamond, theme::run(run.number), name));
     }
     for other in state.others() {
-        names.push((other.look.mark, other.look.colour, format!("target, {}", state.run_label(other.name))));
+        names.push((
+            other.style.mark,
+            other.style.colour,
+            format!("target, {}", state.run_label(other.name)),
+        ));
     }
     if let Some((_, off_m)) = truth_in_site(state) {
         names.push((
@@ -166,13 +170,21 @@ fn names_of(state: &State, stops: &[StopView]) -> Vec<(Mark, Color32, String)> {
     }
     if state.cycle_at(state.cursor.step).is_some() {
         names.push((Mark::Cross, theme::accent(), "goal".to_owned()));
-        names.push((Mark::Stroke(overlay::Line::Dashed), theme::accent(), "planned".to_owned()));
-        names.push((Mark::Stroke(overlay::Line::Dashed), theme::weak(), "by wheels alone, 3σ".to_owned()));
+        names.push((Mark::Stroke(overlay::StrokeStyle::Dashed), theme::accent(), "planned".to_owned()));
+        names.push((
+            Mark::Stroke(overlay::StrokeStyle::Dashed),
+            theme::weak(),
+            "by wheels alone, 3σ".to_owned(),
+        ));
     }
     if state.cycle_at(state.cursor.step).is_some_and(|cycle| cycle.choice.is_some()) {
-        names.push((Mark::Stroke(overlay::Line::Dotted), theme::prediction(), "route".to_owned()));
-        names.push((Mark::Stroke(overlay::Line::Solid), theme::score(1.0), "path by its vote".to_owned()));
-        names.push((Mark::Stroke(overlay::Line::Dotted), theme::failed(), "vetoed path".to_owned()));
+        names.push((Mark::Stroke(overlay::StrokeStyle::Dotted), theme::prediction(), "route".to_owned()));
+        names.push((
+            Mark::Stroke(overlay::StrokeStyle::Solid),
+            theme::score(1.0),
+            "path by its vote".to_owned(),
+        ));
+        names.push((Mark::Stroke(overlay::StrokeStyle::Dotted), theme::failed(), "vetoed path".to_owned()));
         names.push((Mark::Cross, theme::failed(), "first failing cell".to_owned()));
     }
     if let Some(raster) = state.hazards().ready() {
@@ -233,7 +245,7 @@ fn span_m(stops: &[StopView]) -> f64 {
     side(0).max(side(1))
 }
 
-/// Where the run placed the target from each stop.
+/// The run's target positions from each stop, in the site frame.
 fn paint_trail(plot: &mut PlotUi<'_>, stops: &[StopView], run: &RunView, colour: Color32) {
     let trail: Vec<[f64; 2]> =
         convergence::shown(run, stops).iter().map(|at| on_map(&at.point_in_site)).collect();
@@ -245,7 +257,7 @@ fn paint_trail(plot: &mut PlotUi<'_>, stops: &[StopView], run: &RunView, colour:
     );
 }
 
-/// The stop nearest to the pointer, where one is near.
+/// The stop nearest to the pointer; `None` if none is within `CLICK_REACH`.
 fn nearest_stop(plot: &PlotUi<'_>, stops: &[StopView]) -> Option<usize> {
     let pointer = plot.response().hover_pos().or(plot.response().interact_pointer_pos())?;
     let distance = |stop: &StopView| {

@@ -7,12 +7,12 @@ use crate::panels::chart::{few_marks, plain};
 use crate::state::State;
 use crate::theme;
 
-/// East and north of a point of the site frame.
+/// East and north of a point in the site frame.
 pub(super) fn on_map(point_in_site: &Point3) -> [f64; 2] {
     [point_in_site.y, point_in_site.x]
 }
 
-/// A plot seen from above: few marks, and the place under the pointer in words.
+/// A plot seen from above: few ticks, and the position under the pointer in words.
 pub(super) fn in_site<'a>(plot: Plot<'a>, words: impl Fn(&PlotPoint) -> String + 'a) -> Plot<'a> {
     plot.y_axis_min_width(22.0)
         .grid_color(theme::line())
@@ -28,7 +28,7 @@ pub(super) fn in_site<'a>(plot: Plot<'a>, words: impl Fn(&PlotPoint) -> String +
         )
 }
 
-/// The true position, carried by the true pose, and the estimate's distance from it in the site frame, m.
+/// The true position in the site frame by the true pose, and its distance from the estimate, m.
 pub(super) fn truth_in_site(state: &State) -> Option<(Point3, f64)> {
     let (trace, stop) = (state.trace()?, state.stop()?);
     let point = stop.true_site_from_rover?.to_pose() * trace.truth.as_ref()?.position_in_rover;

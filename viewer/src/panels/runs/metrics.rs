@@ -1,4 +1,4 @@
-//! Every metric of the run that is looked at and of those compared with it, with protocol and excluded steps.
+//! Every metric of the selected run and the compared runs, with the evaluation protocol and the excluded steps.
 
 use egui::{Grid, Ui};
 use sightline_session::compare::RunName;
@@ -10,7 +10,7 @@ use crate::panels::runs::table;
 use crate::state::State;
 use crate::theme;
 
-/// Width of a remark, and what is left beside a sentence, points.
+/// Width of a remark, and margin beside a sentence, points.
 const REMARK: f32 = 220.0;
 const MARGIN: f32 = 16.0;
 
@@ -24,7 +24,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         return;
     };
     ui.scope(|ui| {
-        // The panel scrolls to both sides; sentences are as wide as what is seen of it.
+        // The panel scrolls horizontally; sentences are as wide as its visible part.
         ui.set_max_width((ui.clip_rect().width() - MARGIN).max(REMARK));
         for line in header(found) {
             ui.add(egui::Label::new(theme::note(line)).wrap());
@@ -57,7 +57,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     settings(ui, state);
 }
 
-/// A metric in words with its unit.
+/// The title of a metric, with its unit.
 fn title(metric: &str, unit: &str) -> String {
     let words = match metric.split_once('_') {
         Some(("ade", of)) => return format!("mean error, {of}"),
@@ -71,7 +71,7 @@ fn title(metric: &str, unit: &str) -> String {
     if unit.is_empty() || words.ends_with(unit) { words } else { format!("{words}, {unit}") }
 }
 
-/// The settings that are not alike in the compared runs.
+/// The settings that differ between the compared runs.
 fn settings(ui: &mut Ui, state: &State) {
     let Some(found) = state.comparison() else { return };
     ui.add_space(8.0);
@@ -94,7 +94,7 @@ fn settings(ui: &mut Ui, state: &State) {
     });
 }
 
-/// Protocol, version, and which steps count.
+/// Protocol, version, kind of truth, and excluded steps.
 fn header(found: &RunMetrics) -> Vec<String> {
     let truth = match found.truth {
         None => "no truth is known: only survival_steps and mean_nis can be given",

@@ -1,5 +1,5 @@
 //! All runs of the session as a table: states, metrics, and only the settings that differ; below it every metric of the
-//! runs that are compared. Each number leads to the step at which its run does worst by it.
+//! compared runs. Each number links to the run's worst step by that metric.
 
 mod metrics;
 pub(crate) mod table;
@@ -7,7 +7,7 @@ pub(crate) mod table;
 use egui::{ScrollArea, TextEdit, Ui};
 
 use crate::command::Command;
-use crate::compare::Ask;
+use crate::compare::CompareCommand;
 use crate::panels::pane::Need;
 use crate::panels::panel::Panel;
 use crate::state::State;
@@ -38,7 +38,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         let field =
             TextEdit::singleline(&mut words).hint_text("target, run, preset or setting").desired_width(180.0);
         if ui.add(field).labelled_by(label.id).changed() {
-            out.push(Command::Compare(Ask::Filter(words)));
+            out.push(Command::Compare(CompareCommand::Filter(words)));
         }
         ui.label(theme::note(table::count(state)));
     });

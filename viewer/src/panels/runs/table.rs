@@ -8,23 +8,23 @@ use sightline_track::settings::Changes;
 
 use crate::command::Command;
 use crate::compare::panel::{chip, mark};
-use crate::compare::state::Look;
-use crate::compare::{Ask, METRICS, Sort};
+use crate::compare::state::RunStyle;
+use crate::compare::{CompareCommand, METRICS, Sort};
 use crate::drawing::overlay::run_mark;
 use crate::panels::digits;
 use crate::panels::timeline;
 use crate::state::{State, run_letter};
 use crate::theme;
 
-/// A row.
+/// A row: a run and its target.
 #[derive(Clone, Copy)]
-pub(crate) struct Row<'a> {
+pub(crate) struct RunRow<'a> {
     name: RunName,
     target: &'a TargetView,
     run: &'a RunView,
 }
 
-/// How many of the runs are shown.
+/// The number of runs shown, in words.
 pub(crate) fn count(state: &State) -> String {
     let (shown, all) = (rows(state).len(), state.all_runs().count());
     match (shown, all) {
@@ -34,15 +34,15 @@ pub(crate) fn count(state: &State) -> String {
     }
 }
 
-/// The rows that the filter lets through, as they are sorted; what has no value comes last.
-fn rows(state: &State) -> Vec<Row<'_>> {
+/// The rows that pass the filter, in sort order; runs without a value are last.
+fn rows(state: &State) -> Vec<RunRow<'_>> {
     let filter = state.compare.filter.to_lowercase();
-    let mut rows: Vec<Row<'_>> =
-        state.all_runs().map(|(name, target, run)| Row { name, target, run }).collect();
+    let mut rows: Vec<RunRow<'_>> =
+        state.all_runs().map(|(name, target, run)| RunRow { name, target, run }).collect();
     rows.retain(|row| filter.split_whitespace().all(|word| text(state, row).to_lowercase().contains(word)));
     if let Some(metric) = &state.compare.sort.metric {
         let is_descending = state.compare.sort.is_descending;
-        let key = |row: &Row<'_>| state.metric(row.name, metric).and_then(|metric| metric.value);
+        let key = |row: &RunRow<'_>| state.metric(row.name, metric).and_then(|metric| metric.value);
         rows.sort_by(|a, b| match (key(a), key(b)) {
             (Some(a), Some(b)) if is_descending => b.total_cmp(&a),
             (Some(a), Some(b)) => a.total_cmp(&b),
@@ -58,8 +58,8 @@ pub(crate) fn order(state: &State) -> Vec<RunName> {
     rows(state).into_iter().map(|row| row.name).collect()
 }
 
-/// What the filter looks at.
-fn text(state: &State, row: &Row<'_>) -> String {
+/// The text that the filter searches.
+fn text(state: &State, row: &RunRow<'_>) -> String {
     let preset = state.configurations.named(&row.run.settings).map_or("", |preset| preset.name);
     let settings: Vec<String> = row.run.changes.iter().map(|(key, value)| format!("{key}={value}")).collect();
     format!("{} run {} {preset} {}", row.target.label, run_letter(row.run.number), settings.join(" "))
@@ -89,7 +89,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     });
 }
 
-/// A heading: a click sorts, the next one the other way round, a third one not at all.
+/// A heading: the first click sorts best first, the second reverses the order, the third removes the sorting.
 fn heading(
     ui: &mut Ui,
     state: &State,
@@ -109,35 +109,35 @@ fn heading(
     let direction = if *is_more_better { "more is better" } else { "less is better" };
     let response = ui.add(button).on_hover_text(format!("{metric}; {direction}"));
     if response.accessible_name(format!("sort by {metric}")).clicked() {
-        // The best comes first.
+        // The best value is first.
         let next = match (is_sorted, sort.is_descending == *is_more_better) {
             (false, _) => Sort { metric: Some((*metric).to_owned()), is_descending: *is_more_better },
             (true, true) => Sort { metric: Some((*metric).to_owned()), is_descending: !*is_more_better },
             (true, false) => Sort::default(),
         };
-        out.push(Command::Compare(Ask::Sort(next)));
+        out.push(Command::Compare(CompareCommand::Sort(next)));
     }
 }
 
-fn show_row(ui: &mut Ui, state: &State, row: &Row<'_>, out: &mut Vec<Command>) {
+fn show_row(ui: &mut Ui, state: &State, row: &RunRow<'_>, out: &mut Vec<Command>) {
     let label = format!("{} · run {}", row.target.label, run_letter(row.run.number));
     let is_baseline = state.compare.baseline == Some(row.name);
     if star(ui, is_baseline, &label).clicked() {
-        out.push(Command::Compare(Ask::Baseline(row.name)));
+        out.push(Command::Compare(CompareCommand::Baseline(row.name)));
     }
     let is_own = state.own_name() == Some(row.name);
     let mut is_compared = is_own || state.compare.others.contains(&row.name);
     let check = ui.add_enabled(!is_own, egui::Checkbox::without_text(&mut is_compared));
     if check.accessible_name(format!("compare {label}")).changed() {
-        out.push(Command::Compare(Ask::Toggle(row.name)));
+        out.push(Command::Compare(CompareCommand::Toggle(row.name)));
     }
     ui.horizontal(|ui| {
-        mark(ui, look(state, row.name));
+        mark(ui, style_of(state, row.name));
         let words =
             RichText::new(&label).size(12.0).color(if is_own { theme::strong() } else { theme::text() });
         let button = Button::selectable(is_own, words).min_size(vec2(0.0, 24.0));
         if ui.add(button).on_hover_text("looks at this run").clicked() {
-            out.push(Command::Look { target: row.name.target, run: row.name.run });
+            out.push(Command::SelectRun { target: row.name.target, run: row.name.run });
         }
     });
     states(ui, row, state.stop_count());
@@ -147,7 +147,7 @@ fn show_row(ui: &mut Ui, state: &State, row: &Row<'_>, out: &mut Vec<Command>) {
     ui.add(egui::Label::new(theme::note(changes(state, row)).monospace())).on_hover_text(text(state, row));
 }
 
-/// The star of the baseline; the fonts have none.
+/// The star of the baseline, drawn because the fonts have none.
 fn star(ui: &mut Ui, is_baseline: bool, label: &str) -> egui::Response {
     let (frame, response) = ui.allocate_exact_size(vec2(24.0, 24.0), Sense::click());
     let centre = frame.center();
@@ -157,7 +157,7 @@ fn star(ui: &mut Ui, is_baseline: bool, label: &str) -> egui::Response {
     };
     let corners: Vec<egui::Pos2> = (0..10).map(corner).collect();
     if is_baseline {
-        // A star is not convex: it is filled in triangles about its middle.
+        // A star is not convex: it is filled with triangles about its centre.
         for i in 0..10 {
             let triangle = vec![centre, corners[i], corners[(i + 1) % 10]];
             ui.painter().add(egui::Shape::convex_polygon(triangle, theme::accent(), egui::Stroke::NONE));
@@ -172,14 +172,14 @@ fn star(ui: &mut Ui, is_baseline: bool, label: &str) -> egui::Response {
     response.on_hover_text("the baseline: the others are given with their difference to it")
 }
 
-/// How a run is marked: as it is compared, or by its number.
-fn look(state: &State, name: RunName) -> Look {
-    let compared = state.others().into_iter().find(|other| other.name == name).map(|other| other.look);
-    compared.unwrap_or(Look { colour: theme::run(name.run), mark: run_mark(name.run) })
+/// The colour and mark of a run: those of the comparison, else those of its number.
+fn style_of(state: &State, name: RunName) -> RunStyle {
+    let compared = state.others().into_iter().find(|other| other.name == name).map(|other| other.style);
+    compared.unwrap_or(RunStyle { colour: theme::run(name.run), mark: run_mark(name.run) })
 }
 
 /// The states of a run as a thin band.
-fn states(ui: &mut Ui, row: &Row<'_>, stop_count: usize) {
+fn states(ui: &mut Ui, row: &RunRow<'_>, stop_count: usize) {
     let (rect, response) = ui.allocate_exact_size(vec2(90.0, 12.0), Sense::hover());
     timeline::thin_band(ui.painter(), rect, row.target, row.run, stop_count);
     let words = in_words(row.run);
@@ -187,8 +187,8 @@ fn states(ui: &mut Ui, row: &Row<'_>, stop_count: usize) {
     response.on_hover_text(words);
 }
 
-/// The most changes of state that are said one by one.
-const CHANGES_SAID: usize = 12;
+/// Maximum number of state changes listed individually.
+const CHANGES_SHOWN: usize = 12;
 
 /// The states of a run in words.
 fn in_words(run: &RunView) -> String {
@@ -202,8 +202,8 @@ fn in_words(run: &RunView) -> String {
     let piece = |(first, last, state): &(usize, usize, &str)| {
         if first == last { format!("{state} {first}") } else { format!("{state} {first} to {last}") }
     };
-    let mut words = pieces.iter().take(CHANGES_SAID).map(piece).collect::<Vec<_>>().join(", ");
-    if let Some(more) = pieces.len().checked_sub(CHANGES_SAID).filter(|more| *more > 0) {
+    let mut words = pieces.iter().take(CHANGES_SHOWN).map(piece).collect::<Vec<_>>().join(", ");
+    if let Some(more) = pieces.len().checked_sub(CHANGES_SHOWN).filter(|more| *more > 0) {
         words += &format!(" and {more} more changes");
     }
     words
@@ -239,7 +239,7 @@ pub(crate) fn cell(
                 let link = ui.add(Link::new(theme::number(&words).size(11.5)));
                 let link = link.accessible_name(format!("{metric} {words} of {label}, worst at step {step}"));
                 if link.on_hover_text(help).clicked() {
-                    out.push(Command::Compare(Ask::Visit { run: name, step }));
+                    out.push(Command::Compare(CompareCommand::Visit { run: name, step }));
                 }
             }
             None => {
@@ -255,8 +255,8 @@ pub(crate) fn cell(
     });
 }
 
-/// The settings that differ from the baseline's, or from the defaults.
-fn changes(state: &State, row: &Row<'_>) -> String {
+/// The settings that differ from the baseline's, or from the defaults without a baseline.
+fn changes(state: &State, row: &RunRow<'_>) -> String {
     let baseline = state.compare.baseline.filter(|&name| name != row.name);
     let against = baseline.and_then(|name| Some(&state.run_named(name)?.1.changes));
     let nothing = Changes::new();
@@ -273,12 +273,12 @@ fn changes(state: &State, row: &Row<'_>) -> String {
     if lines.is_empty() { "none".to_owned() } else { lines.join(" ") }
 }
 
-/// A setting's value as it is written.
+/// The text of a setting's value.
 pub(crate) fn plain(value: &Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 
-/// A run's mark with its name, as the head of a column.
+/// A run's mark with its name, as a column heading.
 pub(crate) fn head(ui: &mut Ui, state: &State, name: RunName) {
-    ui.horizontal(|ui| chip(ui, look(state, name), &state.run_label(name)));
+    ui.horizontal(|ui| chip(ui, style_of(state, name), &state.run_label(name)));
 }

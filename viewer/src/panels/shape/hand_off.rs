@@ -1,5 +1,5 @@
-//! The hand-off: the last image of the old cameras, draped over its surface as the new camera would see it, beside where
-//! it was found (R205).
+//! The hand-off: the last image of the old cameras, rendered on its mesh from the new camera (“draped”), beside the window
+//! where it was matched (R205).
 
 use egui::{Grid, Label, Ui};
 use sightline_api::wire::StopView;
@@ -9,42 +9,44 @@ use sightline_track::trace::ArrayName;
 
 use crate::drawing::overlay::Mark;
 use crate::panels;
-use crate::panels::shape::look::{Look, ready};
-use crate::panels::shape::picture::{Picture, Unit, side_by_side};
+use crate::panels::shape::array_image::{ArrayImage, DisplayUnit, side_by_side};
+use crate::panels::shape::part_context::{PartContext, ready};
 use crate::theme;
 
-/// What the part is for.
+/// The purpose of the part.
 const PURPOSE: &str =
     "The last image of the old cameras, draped and matched in the image of the new ones, at a hand-off.";
 
 /// Shows the part.
-pub(crate) fn show(ui: &mut Ui, look: &Look<'_>) {
-    let found = look.evidence.registration.as_ref();
-    if let Some(placement) = &look.evidence.placement {
+pub(crate) fn show(ui: &mut Ui, context: &PartContext<'_>) {
+    let found = context.evidence.registration.as_ref();
+    if let Some(placement) = &context.evidence.placement {
         ui.add(Label::new(theme::note(placed(placement))).wrap());
     }
     let Some(draped) = found.and_then(|found| found.draped.as_ref()) else {
-        panels::missing(ui, PURPOSE, &why_none(look));
+        panels::missing(ui, PURPOSE, &why_none(context));
         return;
     };
-    let Some(picture) = ready(ui, look.state.array(ArrayName::DRAPED), "draped picture") else { return };
-    let Some(matched) = ready(ui, look.state.array(ArrayName::DRAPED_MATCH), "present image") else { return };
+    let Some(picture) = ready(ui, context.state.array(ArrayName::DRAPED), "draped picture") else { return };
+    let Some(matched) = ready(ui, context.state.array(ArrayName::DRAPED_MATCH), "present image") else {
+        return;
+    };
     let size = side_by_side(ui, 2, ui.available_height() - 76.0);
     let from = found.map_or(0, |found| found.to_step);
-    let titles = [format!("step {from}, draped"), format!("step {}, where it was found", look.trace.step)];
+    let titles = [format!("step {from}, draped"), format!("step {}, where it was found", context.trace.step)];
     ui.horizontal_top(|ui| {
         for (raster, title) in [picture, matched].into_iter().zip(&titles) {
-            let unit = Unit { word: "", factor: 1.0 };
-            let placed = Picture { title, raster, look: None, unit }.show(ui, size);
+            let unit = DisplayUnit { word: "", factor: 1.0 };
+            let placed = ArrayImage { title, raster, colour_map: None, unit }.show(ui, size);
             let [x, y] = raster.size().map(|side| (f64::from(side) - 1.0) / 2.0);
-            placed.mark(x, y, Mark::Plus, theme::run(look.state.cursor.run));
+            placed.mark(x, y, Mark::Plus, theme::run(context.state.cursor.run));
         }
     });
-    numbers(ui, look, draped);
+    numbers(ui, context, draped);
 }
 
-fn numbers(ui: &mut Ui, look: &Look<'_>, draped: &Draped) {
-    let least = format!("at least {:.2}", look.state.run_settings().shape.hand_off_score_min);
+fn numbers(ui: &mut Ui, context: &PartContext<'_>, draped: &Draped) {
+    let least = format!("at least {:.2}", context.state.run_settings().shape.hand_off_score_min);
     let sigmas = crate::drawing::ellipse::axes(&draped.covariance_px2);
     let sigmas =
         sigmas.map_or_else(String::new, |[a, b]| format!("1σ {:.2} and {:.2} px", a.norm(), b.norm()));
@@ -68,7 +70,7 @@ fn numbers(ui: &mut Ui, look: &Look<'_>, draped: &Draped) {
     });
 }
 
-/// What the arm is told, in a sentence.
+/// The instrument placement as a sentence.
 fn placed(placement: &Placement) -> String {
     let [near, far] = REACH_M.map(|metres| format!("{metres:.1}"));
     let reach = if placement.is_reachable {
@@ -91,15 +93,15 @@ fn placed(placement: &Placement) -> String {
     format!("{reach} {touch}")
 }
 
-/// Why there is no picture at this step.
-fn why_none(look: &Look<'_>) -> String {
-    let step = look.trace.step;
-    if let Some(found) = look.evidence.registration.as_ref().filter(|found| found.is_hand_off) {
+/// Why there is no draped image at this step.
+fn why_none(context: &PartContext<'_>) -> String {
+    let step = context.trace.step;
+    if let Some(found) = context.evidence.registration.as_ref().filter(|found| found.is_hand_off) {
         let reason = found.draped_missing.as_ref().or(found.reason.as_ref());
         let why = reason.map_or("the setting hand_off_picture is off", String::as_str);
         return format!("The cameras change at step {step}, but the draped image was not matched: {why}.");
     }
-    let stops = look.state.traverse.as_ref().map_or(&[][..], |traverse| &traverse.stops);
+    let stops = context.state.traverse.as_ref().map_or(&[][..], |traverse| &traverse.stops);
     match hand_offs(stops).as_slice() {
         [] => format!(
             "No other cameras take over at step {step}. A hand-off is at the first stop whose cameras differ from those \
@@ -115,7 +117,7 @@ fn why_none(look: &Look<'_>) -> String {
     }
 }
 
-/// The stops whose images have another size than those of the stop before: other cameras.
+/// The stops whose image size differs from that of the previous stop: a change of cameras.
 fn hand_offs(stops: &[StopView]) -> Vec<usize> {
     let changes = stops.windows(2).enumerate();
     changes.filter(|(_, pair)| pair[0].left_size != pair[1].left_size).map(|(step, _)| step + 1).collect()

@@ -1,10 +1,10 @@
-//! The errors of depth before and after the registration as a histogram; its two handles set the limit of the colours.
+//! The depth errors before and after the registration as a histogram; its two handles set the limit of the colours.
 
 use egui::{Align2, Color32, CursorIcon, Id, Painter, Rect, Sense, Stroke, StrokeKind, Ui, pos2, vec2};
 
 use crate::command::Command;
 use crate::drawing::overlay::Mark;
-use crate::panels::names;
+use crate::panels::chart_legend;
 use crate::shape_view::ShapeView;
 use crate::state::State;
 use crate::theme;
@@ -13,16 +13,16 @@ use crate::theme;
 pub(crate) const HEIGHT: f32 = 96.0;
 /// Height of the axis, points.
 const AXIS: f32 = 15.0;
-/// Bars.
+/// Number of bars.
 const BARS: usize = 61;
-/// Width of what takes hold of a handle, points.
+/// Width of a handle's drag area, points.
 const GRIP: f32 = 14.0;
-/// The axis ends at this many times what nearly all errors before the registration keep to.
+/// The end of the axis, as a multiple of the automatic limit.
 const BEYOND: f64 = 1.25;
-/// The least limit that can be set, as a share of the axis.
+/// The smallest limit that can be set, as a share of the axis.
 const LEAST: f64 = 0.01;
 
-/// Errors of depth, m; NaN where there is none.
+/// Depth errors, m; NaN if missing.
 pub(crate) struct Errors<'a> {
     /// Before the registration.
     pub(crate) before: &'a [f32],
@@ -30,7 +30,7 @@ pub(crate) struct Errors<'a> {
     pub(crate) end: &'a [f32],
 }
 
-/// Shows the histogram; `limit_m` is that of the colours, `automatic_m` the one they have by themselves.
+/// Shows the histogram; `limit_m` is the limit of the colours, `automatic_m` its automatic value.
 pub(crate) fn show(
     ui: &mut Ui,
     state: &State,
@@ -46,7 +46,7 @@ pub(crate) fn show(
             (Mark::Square, theme::keypoint(), format!("at the start, {}", words(errors.before))),
             (Mark::Dot, colour, format!("at the end, {}", words(errors.end))),
         ];
-        names::wrapped(ui, &title, &said);
+        chart_legend::wrapped(ui, &title, &said);
         let is_set = state.shape_view.error_limit_m.is_some();
         let button = ui.add_enabled(is_set, egui::Button::new("Automatic limit").small());
         if button.on_hover_text("99th percentile of the absolute errors at the start").clicked() {
@@ -70,7 +70,7 @@ fn set(state: &State, error_limit_m: Option<f64>) -> Command {
     Command::SetShapeView(ShapeView { error_limit_m, ..state.shape_view })
 }
 
-/// Root mean square, the value that 95 in a hundred keep to, and how many pixels have one.
+/// RMS, 95th percentile of the absolute errors, and share of pixels that have an error.
 fn words(errors: &[f32]) -> String {
     let mut sizes: Vec<f32> = errors.iter().filter(|v| v.is_finite()).map(|v| v.abs()).collect();
     if sizes.is_empty() {
@@ -84,7 +84,7 @@ fn words(errors: &[f32]) -> String {
     format!("rms {:.2} cm, 95 % within {:.2} cm, {share:.0} % of pixels", rms_m * 100.0, p95_m * 100.0)
 }
 
-/// How many errors fall into each bar from minus `end_m` to it; the outermost hold what lies beyond.
+/// Counts of errors in bars from −`end_m` to `end_m`; the outermost bars also count all errors beyond.
 fn bars(errors: &[f32], end_m: f64) -> [usize; BARS] {
     let mut bars = [0; BARS];
     for error in errors.iter().filter(|v| v.is_finite()) {
@@ -95,7 +95,7 @@ fn bars(errors: &[f32], end_m: f64) -> [usize; BARS] {
     bars
 }
 
-/// Where each bar begins and ends, m, and how many errors it has at the start and at the end.
+/// Lower and upper edge of each bar, m, and its counts at the start and at the end.
 pub(crate) fn counts(errors: &Errors<'_>, automatic_m: f64) -> Vec<(f64, f64, [usize; 2])> {
     let end_m = automatic_m * BEYOND;
     let edge = |bar: usize| end_m * (2.0 * bar as f64 / BARS as f64 - 1.0);
@@ -103,7 +103,7 @@ pub(crate) fn counts(errors: &Errors<'_>, automatic_m: f64) -> Vec<(f64, f64, [u
     both.map(|(bar, (before, end))| (edge(bar), edge(bar + 1), [before, end])).collect()
 }
 
-/// Filled bars, or only their outline.
+/// Bars, filled if a colour is given, else outlined.
 fn paint(painter: &Painter, plot: Rect, bars: &[usize; BARS], most: usize, fill: Option<Color32>) {
     let width = plot.width() / BARS as f32;
     for (i, count) in bars.iter().enumerate().filter(|(_, count)| **count > 0) {

@@ -1,16 +1,16 @@
-//! The shape tracker at one step: the surface that stereo sees, the virtual range sensor, the search, both meshes, and the
+//! The shape tracker at one step: the dense stereo surface, the virtual range sensor, the search, both meshes, and the
 //! hand-off to other cameras (R155, R187–R203, R205).
 //!
-//! One part at a time, chosen by its name; a part without data says why.
+//! One part at a time, selected by its name; a part without data explains why.
 
 mod hand_off;
 mod histogram;
-mod look;
+mod part_context;
 mod meshes;
-mod picture;
+mod array_image;
 pub(crate) mod search;
 pub(crate) mod sensor;
-mod solid;
+mod scene;
 mod surface;
 
 use egui::{RichText, ScrollArea, Ui};
@@ -20,9 +20,9 @@ use sightline_track::trace::StepTrace;
 
 use crate::command::Command;
 use crate::panels::panel::{Panel, TableOf};
-use crate::panels::shape::look::Look;
+use crate::panels::shape::part_context::PartContext;
 use crate::panels::sheets;
-use crate::shape_view::{Part, ShapeView};
+use crate::shape_view::{ShapePart, ShapeView};
 use crate::state::State;
 use crate::theme;
 
@@ -46,7 +46,7 @@ impl Panel for Shape {
 /// Shows the panel.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let (Some(trace), Some(evidence)) = (state.trace(), state.shape_evidence()) else { return };
-    let look = Look { state, trace, evidence };
+    let context = PartContext { state, trace, evidence };
     parts(ui, state, out);
     if let Some(words) = warning(trace, evidence) {
         ui.add(egui::Label::new(RichText::new(words).small().color(theme::lost())).wrap());
@@ -55,13 +55,13 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         summary(ui, found);
     }
     ui.separator();
-    // A low panel scrolls instead of squeezing its pictures to nothing.
+    // A low panel scrolls instead of shrinking its images.
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| match state.shape_view.part {
-        Part::Surface => surface::show(ui, &look),
-        Part::Sensor => sensor::show(ui, &look, out),
-        Part::Search => search::show(ui, &look),
-        Part::Meshes => meshes::show(ui, &look, out),
-        Part::HandOff => hand_off::show(ui, &look),
+        ShapePart::Surface => surface::show(ui, &context),
+        ShapePart::Sensor => sensor::show(ui, &context, out),
+        ShapePart::Search => search::show(ui, &context),
+        ShapePart::Meshes => meshes::show(ui, &context, out),
+        ShapePart::HandOff => hand_off::show(ui, &context),
     });
 }
 
@@ -69,7 +69,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
 fn parts(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 3.0;
-        for part in Part::ALL {
+        for part in ShapePart::ALL {
             let is_present = state.shape_view.part == part;
             if ui.selectable_label(is_present, part.title()).clicked() && !is_present {
                 out.push(Command::SetShapeView(ShapeView { part, ..state.shape_view }));
@@ -78,7 +78,7 @@ fn parts(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     });
 }
 
-/// The prediction against the basin in which a registration settles on the right place (R155).
+/// Warns if the prediction's 1σ exceeds the basin of convergence of the registration (R155).
 fn warning(trace: &StepTrace, evidence: &ShapeEvidence) -> Option<String> {
     let half_width_m = evidence.registration.as_ref()?.half_width_m;
     let covariance = &trace.prediction()?.covariance_in_rover;
@@ -93,7 +93,7 @@ fn warning(trace: &StepTrace, evidence: &ShapeEvidence) -> Option<String> {
     })
 }
 
-/// A registration in one line, and the reason where it is not used.
+/// A registration in one line, and the reason if it is not used.
 fn summary(ui: &mut Ui, found: &Registered) {
     let mm = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |m| format!("{:.1}", m * 1000.0));
     let [before, coarse, end] = found.mean_m.map(mm);

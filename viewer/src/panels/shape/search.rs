@@ -1,5 +1,5 @@
-//! The coarse search, mean distance of the surfaces over all shifts, with the basin of the rock's half width (R155, R200);
-//! and the way of the refinement (R201).
+//! The coarse search, the mean distance of the surfaces over all shifts, with the basin given by the rock's half width
+//! (R155, R200); and the path of the refinement (R201).
 
 use egui::{Color32, Rect, Ui, UiBuilder, vec2};
 use egui_plot::{Line, LineStyle, MarkerShape, Plot, PlotImage, PlotPoint, Points};
@@ -14,78 +14,84 @@ use crate::drawing::raster;
 use crate::drawing::raster::Raster;
 use crate::panels;
 use crate::panels::chart::plain;
-use crate::panels::names;
-use crate::panels::shape::look::{Look, ready, why_not};
-use crate::panels::shape::picture::{BAR, Unit, colour_bar};
+use crate::panels::chart_legend;
+use crate::panels::shape::array_image::{BAR, DisplayUnit, colour_bar};
+use crate::panels::shape::part_context::{PartContext, ready, why_not};
 use crate::state::State;
 use crate::theme;
 
-/// From this width on both stand side by side, points.
+/// Minimum width at which both are side by side, points.
 const TWO_COLUMNS: f32 = 520.0;
-/// Least height of a plot, points.
+/// Minimum height of a plot, points.
 const LEAST: f32 = 150.0;
 /// Points of the basin's outline.
 const OUTLINE: u32 = 96;
 /// Height of the names above a plot, points.
 const NAMES: f32 = 56.0;
-/// Height of the words below a plot, points.
+/// Height of the text below a plot, points.
 const WORDS: f32 = 32.0;
-/// Mean distances are said in millimetres.
-const MM: Unit = Unit { word: "mm", factor: 1000.0 };
+/// Mean distances are shown in millimetres.
+const MM: DisplayUnit = DisplayUnit { word: "mm", factor: 1000.0 };
 
 /// Shows the part.
-pub(super) fn show(ui: &mut Ui, look: &Look<'_>) {
-    let found = look.evidence.registration.as_ref().filter(|found| found.coarse_shift_m.is_some());
+pub(super) fn show(ui: &mut Ui, context: &PartContext<'_>) {
+    let found = context.evidence.registration.as_ref().filter(|found| found.coarse_shift_m.is_some());
     let Some(found) = found else {
         panels::missing(
             ui,
             "The coarse search over all shifts, and the refinement.",
-            &why_not(look, "search"),
+            &why_not(context, "search"),
         );
         return;
     };
     let height = ui.available_height();
     if ui.available_width() < TWO_COLUMNS {
         let half = (height / 2.0 - NAMES).max(LEAST);
-        coarse(ui, look, found, half);
-        refinement(ui, look, found, half);
+        coarse(ui, context, found, half);
+        refinement(ui, context, found, half);
     } else {
         ui.columns(2, |columns| {
-            coarse(&mut columns[0], look, found, (height - NAMES).max(LEAST));
-            refinement(&mut columns[1], look, found, (height - NAMES).max(LEAST));
+            coarse(&mut columns[0], context, found, (height - NAMES).max(LEAST));
+            refinement(&mut columns[1], context, found, (height - NAMES).max(LEAST));
         });
     }
 }
 
-/// How far apart the shifts of a search with so many to a side are, m.
+/// The spacing of the shifts of a search with `side` shifts per axis, m.
 pub(crate) fn step_m(state: &State, found: &Registered, side: u32) -> f64 {
     let columns = state.array(ArrayName::SENSOR).ready().map(|sensor| sensor.size()[0]);
-    // Without the sensor's picture, whose pixel is a step, the steps follow from how far the search went.
+    // Without the sensor's depth map, whose pixel size is the spacing, derive it from the search range.
     columns
         .and_then(|columns| sensor_pixel_m(found, columns))
         .unwrap_or(2.0 * found.search_m / f64::from(side.saturating_sub(1).max(1)))
 }
 
-/// J over Δx and Δy.
-fn coarse(ui: &mut Ui, look: &Look<'_>, found: &Registered, height: f32) {
-    let Some(raster) = ready(ui, look.state.array(ArrayName::COARSE_SEARCH), "coarse search") else { return };
+/// The mean distance J over Δx and Δy.
+fn coarse(ui: &mut Ui, context: &PartContext<'_>, found: &Registered, height: f32) {
+    let Some(raster) = ready(ui, context.state.array(ArrayName::COARSE_SEARCH), "coarse search") else {
+        return;
+    };
     let side = raster.size()[0];
-    let step_m = step_m(look.state, found, side);
-    let run = theme::run(look.state.cursor.run);
-    names::wrapped(
+    let step_m = step_m(context.state, found, side);
+    let run = theme::run(context.state.cursor.run);
+    chart_legend::wrapped(
         ui,
         "mean distance of the surfaces, by shift across the line of sight",
         &[
             (Mark::Plus, theme::strong(), "start".to_owned()),
             (Mark::Ring, run, "best".to_owned()),
-            (Mark::Stroke(overlay::Line::Dashed), theme::search(), "basin: the rock’s half width".to_owned()),
+            (
+                Mark::Stroke(overlay::StrokeStyle::Dashed),
+                theme::search(),
+                "basin: the rock’s half width".to_owned(),
+            ),
         ],
     );
     let area = Rect::from_min_size(ui.cursor().min, vec2(ui.available_width(), height - WORDS));
     let (left, bar) = area.split_left_right_at_x(area.right() - BAR);
     let mut part = ui.new_child(UiBuilder::new().max_rect(left).id_salt("coarse search"));
     let at = surface(&mut part, raster, found, step_m, run);
-    let colours = raster::Look::Values(raster.levels);
+    let colours = raster::ColourMap::Values(raster.levels);
     colour_bar(ui.painter(), bar.shrink2(vec2(2.0, 6.0)), colours, MM);
     ui.advance_cursor_after_rect(area);
     let words = match at.and_then(|at| cell(raster, step_m, at)) {
@@ -95,7 +101,7 @@ fn coarse(ui: &mut Ui, look: &Look<'_>, found: &Registered, height: f32) {
     ui.add(egui::Label::new(theme::note(words)).wrap());
 }
 
-/// What the search was, where the pointer is elsewhere.
+/// The extent of the search, shown while the pointer is elsewhere.
 fn resting(found: &Registered, step_m: f64, side: u32) -> String {
     let best = found.coarse_shift_m.map_or_else(String::new, |[x, y, z]| {
         format!("; best at Δx {:+.1}, Δy {:+.1}, Δz {:+.1} cm", x * 100.0, y * 100.0, z * 100.0)
@@ -113,7 +119,7 @@ fn resting(found: &Registered, step_m: f64, side: u32) -> String {
     )
 }
 
-/// The value under the pointer.
+/// The value under the pointer; `None` outside the search.
 fn cell(raster: &Raster, step_m: f64, [x_cm, y_cm]: [f64; 2]) -> Option<String> {
     let steps = i64::from(raster.size()[0] / 2);
     let index = |cm: f64| (cm / (100.0 * step_m)).round() as i64 + steps;
@@ -121,13 +127,13 @@ fn cell(raster: &Raster, step_m: f64, [x_cm, y_cm]: [f64; 2]) -> Option<String> 
     if column < 0 || row < 0 || column > 2 * steps || row > 2 * steps {
         return None;
     }
-    let value = raster.at(column, row).map_or_else(|| "too little overlaps".to_owned(), |v| MM.say(v));
+    let value = raster.at(column, row).map_or_else(|| "too little overlaps".to_owned(), |v| MM.format(v));
     Some(format!("Δx {x_cm:+.1}, Δy {y_cm:+.1} cm: {value}"))
 }
 
-/// The surface itself; returns where the pointer is, cm.
+/// The plot of the coarse search. Returns the shift under the pointer, cm.
 fn surface(ui: &mut Ui, raster: &Raster, found: &Registered, step_m: f64, run: Color32) -> Option<[f64; 2]> {
-    raster.look(raster::Look::Values(raster.levels));
+    raster.set_colour_map(raster::ColourMap::Values(raster.levels));
     let [width, height] = raster.size().map(|side| f64::from(side) * step_m * 100.0);
     let basin_cm = found.half_width_m * 100.0;
     let reach = basin_cm.max(width / 2.0) * 1.05;
@@ -173,13 +179,13 @@ fn surface(ui: &mut Ui, raster: &Raster, found: &Registered, step_m: f64, run: C
     response.inner.filter(|_| hovered).map(|at| [at.x, -at.y])
 }
 
-/// J over the evaluations of the refinement.
-fn refinement(ui: &mut Ui, look: &Look<'_>, found: &Registered, height: f32) {
+/// The mean distance J over the evaluations of the refinement.
+fn refinement(ui: &mut Ui, context: &PartContext<'_>, found: &Registered, height: f32) {
     if found.mean_m[2].is_none() {
-        panels::missing(ui, "The refinement.", &why_not(look, "refinement"));
+        panels::missing(ui, "The refinement.", &why_not(context, "refinement"));
         return;
     }
-    let Some(path) = ready(ui, look.state.refine_path(), "refinement") else { return };
+    let Some(path) = ready(ui, context.state.refine_path(), "refinement") else { return };
     let Some(last) = path.last() else {
         panels::missing(ui, "", "The refinement made no step: it stayed where the coarse search ended.");
         return;
@@ -193,12 +199,12 @@ fn refinement(ui: &mut Ui, look: &Look<'_>, found: &Registered, height: f32) {
     let run_name = |run: u32| if run == 0 { "first run".to_owned() } else { format!("restart {run}") };
     let entries: Vec<(Mark, Color32, String)> =
         (0..runs).map(|run| (Mark::Dot, theme::run(run as usize), run_name(run))).collect();
-    names::wrapped(ui, &title, &entries);
+    chart_legend::wrapped(ui, &title, &entries);
     let nearest = plot(ui, path, height - WORDS);
     ui.add(egui::Label::new(theme::note(words(nearest.unwrap_or(last)))).wrap());
 }
 
-/// The plot; returns the step next to the pointer.
+/// The plot of the refinement. Returns the step nearest to the pointer.
 fn plot<'a>(ui: &mut Ui, path: &'a [PathStep], height: f32) -> Option<&'a PathStep> {
     let plot = Plot::new("refinement")
         .height(height)

@@ -1,4 +1,4 @@
-//! The surface of the stop: disparities and ranges, and what became of the pixels (R187).
+//! The dense stereo surface of the stop: disparities and ranges, and the outcome of the pixels (R187).
 
 use egui::{Grid, Ui};
 use sightline_track::locate::shape_tracker::surface::SurfaceSeen;
@@ -7,11 +7,11 @@ use sightline_track::trace::ArrayName;
 use crate::drawing::overlay::Mark;
 use crate::drawing::raster;
 use crate::panels;
-use crate::panels::shape::look::{Look, ready, why_not};
-use crate::panels::shape::picture::{Picture, Unit, side_by_side};
+use crate::panels::shape::array_image::{ArrayImage, DisplayUnit, side_by_side};
+use crate::panels::shape::part_context::{PartContext, ready, why_not};
 use crate::theme;
 
-/// What becomes of a pixel, in the order of [`SurfaceSeen::pixels`], and what that means.
+/// The outcomes of a pixel in the order of [`SurfaceSeen::pixels`], and their meanings.
 const KINDS: [(&str, &str); 7] = [
     ("found", "a disparity that passed all checks"),
     ("outside", "not in both images"),
@@ -23,38 +23,38 @@ const KINDS: [(&str, &str); 7] = [
 ];
 
 /// Shows the part.
-pub(crate) fn show(ui: &mut Ui, look: &Look<'_>) {
-    let Some(seen) = &look.evidence.surface else {
-        panels::missing(ui, "Dense stereo of the stop.", &why_not(look, "surface"));
+pub(crate) fn show(ui: &mut Ui, context: &PartContext<'_>) {
+    let Some(seen) = &context.evidence.surface else {
+        panels::missing(ui, "Dense stereo of the stop.", &why_not(context, "surface"));
         return;
     };
-    let Some(disparities) = ready(ui, look.state.array(ArrayName::DISPARITIES), "disparities") else {
+    let Some(disparities) = ready(ui, context.state.array(ArrayName::DISPARITIES), "disparities") else {
         return;
     };
-    let Some(ranges) = ready(ui, look.state.array(ArrayName::RANGES), "ranges") else { return };
+    let Some(ranges) = ready(ui, context.state.array(ArrayName::RANGES), "ranges") else { return };
     let size = side_by_side(ui, 2, ui.available_height() - 112.0);
-    let target = target(look, seen);
+    let target = target(context, seen);
     ui.horizontal_top(|ui| {
         let pictures = [
-            ("disparity, px", disparities, Unit { word: "px", factor: 1.0 }),
-            ("range from the left camera, m", ranges, Unit { word: "m", factor: 1.0 }),
+            ("disparity, px", disparities, DisplayUnit { word: "px", factor: 1.0 }),
+            ("range from the left camera, m", ranges, DisplayUnit { word: "m", factor: 1.0 }),
         ];
         for (title, raster, unit) in pictures {
-            let colours = Some(raster::Look::Values(raster.levels));
-            let placed = Picture { title, raster, look: colours, unit }.show(ui, size);
+            let colours = Some(raster::ColourMap::Values(raster.levels));
+            let placed = ArrayImage { title, raster, colour_map: colours, unit }.show(ui, size);
             if let Some([x, y]) = target {
-                placed.mark(x, y, Mark::Ring, theme::run(look.state.cursor.run));
+                placed.mark(x, y, Mark::Ring, theme::run(context.state.cursor.run));
             }
         }
     });
     counts(ui, seen);
 }
 
-/// The target in the pictures, which are aligned and thinned.
-fn target(look: &Look<'_>, seen: &SurfaceSeen) -> Option<[f64; 2]> {
-    let camera = look.state.aligned_left()?;
-    let located = look.trace.located().and_then(|located| located.position_in_rover);
-    let predicted = look.trace.prediction().map(|predicted| predicted.position_in_rover);
+/// The target's position in the arrays, which are aligned and decimated.
+fn target(context: &PartContext<'_>, seen: &SurfaceSeen) -> Option<[f64; 2]> {
+    let camera = context.state.aligned_left()?;
+    let located = context.trace.located().and_then(|located| located.position_in_rover);
+    let predicted = context.trace.prediction().map(|predicted| predicted.position_in_rover);
     let pixel = camera.project(&located.or(predicted)?)?;
     let every = seen.shown_every.max(1) as f64;
     (camera.size == seen.size).then(|| [pixel.x / every, pixel.y / every])

@@ -1,4 +1,4 @@
-//! What the feature tracker saw at one step as tables: residuals, draws, and every feature.
+//! The evidence of the feature tracker at one step as tables: residuals, RANSAC iterations, and the shown features.
 
 use sightline_track::locate::features::rows::{Feature, Matched};
 
@@ -6,9 +6,9 @@ use crate::cache::Slot;
 use crate::panels::features::charts::Histogram;
 use crate::panels::sheets::{Cell, Column, Sheet};
 use crate::state::State;
-use crate::tables::Kind;
+use crate::tables::MatchOutcome;
 
-/// The residuals of the matches as counts, how many matches agreed with each draw, and the features that are shown.
+/// The histogram of the residuals, the number of inliers of each RANSAC iteration, and the features that are shown.
 pub(crate) fn features(state: &State) -> Result<Vec<Sheet>, String> {
     let evidence = state.feature_evidence().filter(|evidence| evidence.detect.is_some());
     let evidence = evidence.ok_or_else(|| state.missing_features())?;
@@ -34,7 +34,7 @@ fn residuals(state: &State, all: &[Feature]) -> Sheet {
     let last = histogram.inliers.len() - 1;
     for (bar, (inliers, outliers)) in histogram.inliers.iter().zip(&histogram.outliers).enumerate() {
         let edge = |edge: usize| Cell::Number(edge as f64 * histogram.step_m * 100.0);
-        // The last one holds whatever is larger.
+        // The last bin also counts all larger residuals.
         let to = if bar == last { Cell::Nothing } else { edge(bar + 1) };
         let counts = [inliers, outliers].map(|count| Cell::Number(*count as f64));
         sheet.row(false, [edge(bar), to].into_iter().chain(counts).collect());
@@ -66,10 +66,10 @@ fn each(state: &State, all: &[Feature]) -> Sheet {
     let columns = columns.map(|(name, unit)| Column::new(name, unit)).to_vec();
     let mut sheet = Sheet::of(format!("Features that are shown, step {}", state.cursor.step), columns);
     for feature in all.iter().filter(|feature| state.feature_view.shows(feature)) {
-        let kind = match Kind::of(feature) {
-            Kind::Unmatched => "no match",
-            Kind::Inlier => "inlier",
-            Kind::Outlier => "outlier",
+        let kind = match MatchOutcome::of(feature) {
+            MatchOutcome::Unmatched => "no match",
+            MatchOutcome::Inlier => "inlier",
+            MatchOutcome::Outlier => "outlier",
         };
         let matched = |of: fn(&Matched) -> Option<f64>| Cell::from(feature.matched.as_ref().and_then(of));
         let (x, y) = (Cell::Number(feature.pixel.x), Cell::Number(feature.pixel.y));

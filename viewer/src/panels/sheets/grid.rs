@@ -1,17 +1,17 @@
-//! A table on the screen: rows are made only while they are seen, and for a screen reader it is a table with a head,
-//! rows and cells. A click on a step goes there.
+//! A table on the screen: only visible rows are laid out, and screen readers receive it as a table with headings, rows and
+//! cells. A click on a step selects it.
 
 use egui::{Button, Label, RichText, ScrollArea, Ui, vec2};
 
 use crate::command::{Command, Go};
-use crate::panels::sheets::{Row, Sheet};
+use crate::panels::sheets::{Sheet, SheetRow};
 use crate::theme;
 
 /// Height of a row, points.
 const ROW: f32 = 24.0;
-/// Width of a letter, points.
+/// Assumed width of a character, points.
 const LETTER: f32 = 7.2;
-/// Rows of each of several tables that are seen at a time.
+/// Visible rows of each table if there are several.
 const TALL: f32 = 14.0;
 
 /// Shows tables, one below the other.
@@ -42,9 +42,9 @@ fn one(ui: &mut Ui, sheet: &Sheet, tall: f32, out: &mut Vec<Command>) {
         role(ui, egui::Role::Table, &rows);
         ui.spacing_mut().item_spacing = vec2(0.0, 0.0);
         head(ui, sheet, &widths);
-        // A long table keeps its head in sight and makes only the rows that are seen.
+        // A long table keeps its head visible and lays out only the visible rows.
         let mut rows = ScrollArea::vertical().id_salt("rows").max_height(tall).auto_shrink([false, true]);
-        if let Some(at) = came_to(ui, sheet) {
+        if let Some(at) = newly_current_row(ui, sheet) {
             rows = rows.vertical_scroll_offset((at as f32 * ROW - 0.5 * tall).max(0.0));
         }
         rows.show_rows(ui, ROW, sheet.rows.len(), |ui, range| {
@@ -55,8 +55,8 @@ fn one(ui: &mut Ui, sheet: &Sheet, tall: f32, out: &mut Vec<Command>) {
     });
 }
 
-/// The row of the cursor's step, in the frame in which the cursor came there.
-fn came_to(ui: &Ui, sheet: &Sheet) -> Option<usize> {
+/// The row of the cursor's step in the frame in which the cursor moved there, else `None`.
+fn newly_current_row(ui: &Ui, sheet: &Sheet) -> Option<usize> {
     let present = sheet.rows.iter().position(|row| row.is_present);
     let id = ui.unique_id().with("present row");
     let before =
@@ -64,7 +64,7 @@ fn came_to(ui: &Ui, sheet: &Sheet) -> Option<usize> {
     present.filter(|_| before != present)
 }
 
-/// The width of every column: that of its longest word.
+/// The width of every column, which fits its longest text, points.
 fn widths(sheet: &Sheet) -> Vec<f32> {
     let letters = |column: usize| {
         let head = sheet.columns[column].head().chars().count();
@@ -88,7 +88,7 @@ fn head(ui: &mut Ui, sheet: &Sheet, widths: &[f32]) {
     });
 }
 
-fn line(ui: &mut Ui, row: &Row, widths: &[f32], out: &mut Vec<Command>) {
+fn line(ui: &mut Ui, row: &SheetRow, widths: &[f32], out: &mut Vec<Command>) {
     let area = egui::Rect::from_min_size(ui.next_widget_position(), vec2(widths.iter().sum(), ROW));
     if row.is_present {
         ui.painter().rect_filled(area, 2.0, theme::selected());
@@ -125,7 +125,7 @@ fn line(ui: &mut Ui, row: &Row, widths: &[f32], out: &mut Vec<Command>) {
     });
 }
 
-/// Gives what `ui` holds a role and a name.
+/// Sets the accessibility role and label of `ui`.
 fn role(ui: &Ui, role: egui::Role, name: &str) {
     ui.ctx().accesskit_node_builder(ui.unique_id(), |node| {
         node.set_role(role);

@@ -1,16 +1,16 @@
-//! Plots and surfaces as tables: the same values as numbers, with units, the present step marked, to be read, heard
-//! and copied as CSV.
+//! Plots and images as tables: the same values as numbers, with units and the current step marked, for reading, screen
+//! readers and copying as CSV.
 //!
 //! | file | what it does |
 //! |---|---|
 //! | `sheet` | a table: columns with units, rows, CSV |
 //! | `of_panel` | the tables of a panel, and the switch between both |
 //! | `grid` | a table on the screen and for a screen reader |
-//! | `scores` | the surface of scores and the stereo profile |
-//! | `steps` | what is plotted over the steps |
+//! | `scores` | the score map and the stereo profile |
+//! | `steps` | NEES, NIS and coverage |
 //! | `places` | the map, the error budget and the template's history |
-//! | `features` | residuals, draws and features |
-//! | `shape` | registration, errors of depth, coarse search and refinement |
+//! | `features` | residuals, RANSAC iterations and features |
+//! | `shape` | registration, depth errors, coarse search and refinement |
 
 pub(crate) mod features;
 mod grid;
@@ -21,4 +21,4 @@ pub(crate) mod shape;
 pub(crate) mod sheet;
 pub(crate) mod steps;
 
-pub(crate) use self::sheet::{Cell, Column, Row, Sheet};
+pub(crate) use self::sheet::{Cell, Column, Sheet, SheetRow};

@@ -1,4 +1,4 @@
-//! A panel as tables, and the switch between the two.
+//! The tables of a panel, and the switch between panel and tables.
 
 use egui::{Button, Ui, vec2};
 
@@ -8,15 +8,15 @@ use crate::panels::pane::Pane;
 use crate::panels::sheets::{Sheet, grid};
 use crate::state::State;
 
-/// The panels that can be looked at as tables.
+/// The panels that can be shown as tables.
 pub(crate) fn panes() -> impl Iterator<Item = Pane> {
     Pane::ALL.into_iter().filter(|pane| pane.has_table())
 }
 
-/// What a panel shows, as tables.
+/// The contents of a panel as tables.
 ///
 /// # Errors
-/// The sentence that says why there is nothing yet, and how to fill it.
+/// A sentence that explains why there is no data, and how to obtain it.
 pub(crate) fn of(state: &State, pane: Pane) -> Result<Vec<Sheet>, String> {
     match pane.panel().table() {
         Some(table) => table(state),
@@ -32,7 +32,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, pane: Pane, out: &mut Vec<Command
     }
 }
 
-/// The switch between a panel and its table; nothing for a panel that has none.
+/// The switch between a panel and its table; nothing for a panel without tables.
 pub(crate) fn switch(ui: &mut Ui, state: &State, pane: Pane, out: &mut Vec<Command>) {
     if !pane.has_table() {
         return;

@@ -1,4 +1,4 @@
-//! Where rover and target are, what the error budget predicts, and how the template held, as tables by step.
+//! Rover and target positions, the error budget, and the template's history, as tables by step.
 
 use sightline_geometry::frames::Point3;
 
@@ -41,7 +41,7 @@ pub(crate) fn map(state: &State) -> Result<Vec<Sheet>, String> {
     Ok(vec![sheet])
 }
 
-/// Predicted with and without tracking, and achieved.
+/// The errors predicted with and without tracking, and the achieved ones.
 pub(crate) fn budget(state: &State) -> Result<Vec<Sheet>, String> {
     let run = state.run().ok_or_else(|| state.missing_target())?;
     let columns =
@@ -56,7 +56,7 @@ pub(crate) fn budget(state: &State) -> Result<Vec<Sheet>, String> {
     Ok(vec![sheet])
 }
 
-/// How well each earlier template is found in the current view, and how far from the position of the step.
+/// The score of each earlier template in the current view, and its shift from the position of the step.
 pub(crate) fn history(state: &State) -> Result<Vec<Sheet>, String> {
     let run = state.run().ok_or_else(|| state.missing_target())?;
     let columns = vec![Column::new("state", ""), Column::new("score", ""), Column::new("shift", "px")];

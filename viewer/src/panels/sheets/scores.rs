@@ -1,4 +1,4 @@
-//! The scores of a match as tables: of the template over the search window, and of point stereo along the curve.
+//! The scores of a match as tables: of the template over the search window, and of point stereo along the epipolar curve.
 
 use sightline_geometry::frames::Pixel;
 use sightline_track::trace::ArrayName;
@@ -7,10 +7,10 @@ use crate::panels::score_marks::region_of;
 use crate::panels::sheets::{Cell, Column, Sheet};
 use crate::state::State;
 
-/// Scores that are read, to either side of the peak; the copy has all of them.
+/// Positions listed to either side of the peak; the copy has all of them.
 const NEAR_PX: i64 = 4;
 
-/// The marks on the surface, the scores about the peak, and all scores for the copy.
+/// The marks on the score map, the scores about the peak, and all scores for the copy.
 pub(crate) fn surface(state: &State) -> Result<Vec<Sheet>, String> {
     let matched = state.trace().and_then(|trace| trace.template()).and_then(|e| e.match_template.as_ref());
     let (Some(trace), Some(matched)) = (state.trace(), matched) else { return Err(state.missing_template()) };

@@ -1,5 +1,5 @@
-//! What the shape tracker saw at one step as tables: the registration in numbers, the errors of depth, the coarse search and
-//! the way of the refinement.
+//! The evidence of the shape tracker at one step as tables: the registration, the depth errors, the coarse search, and the
+//! steps of the refinement.
 
 use sightline_track::locate::shape_tracker::evidence::Registered;
 use sightline_track::locate::shape_tracker::rows::PathStep;
@@ -11,7 +11,7 @@ use crate::panels::shape::sensor::error_counts;
 use crate::panels::sheets::{Cell, Column, Sheet};
 use crate::state::State;
 
-/// The tables of the step's registration; of what is not loaded there is none.
+/// The tables of the step's registration; arrays that are not loaded are omitted.
 pub(crate) fn shape(state: &State) -> Result<Vec<Sheet>, String> {
     let evidence = state.shape_evidence().ok_or_else(|| state.missing_shape())?;
     let Some(found) = &evidence.registration else {
@@ -77,7 +77,7 @@ fn coarse(raster: &Raster, step_m: f64) -> Sheet {
     let places = || (0..height).flat_map(|row| (0..width).map(move |column| (column, row)));
     let least = places().filter_map(|(x, y)| raster.at(x, y)).fold(f32::INFINITY, f32::min);
     for (column, row) in places() {
-        // Where too little overlaps there is no distance.
+        // Shifts with too little overlap have no distance.
         let Some(mean_m) = raster.at(column, row) else { continue };
         let shift = |index: i64, side: i64| Cell::Number((index - side / 2) as f64 * step_m * 100.0);
         let cells = vec![shift(column, width), shift(row, height), Cell::Number(f64::from(mean_m) * 1000.0)];

@@ -1,4 +1,4 @@
-//! A table of values, and the same as CSV (RFC 4180): full digits, units in the head, nothing where there is no value.
+//! A table of values and its CSV (RFC 4180): all digits, units in the head, and empty cells for missing values.
 
 use sightline_api::table;
 use sightline_session::step::StepRow;
@@ -17,7 +17,7 @@ pub enum Cell {
 }
 
 impl Cell {
-    /// As it is read.
+    /// The text shown on the screen.
     pub fn shown(&self) -> String {
         match self {
             Self::Number(value) => digits(*value),
@@ -41,10 +41,10 @@ impl From<Option<f64>> for Cell {
     }
 }
 
-/// A column: its name, and its unit where it has one.
+/// A column: its name and unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
-    /// What it is called.
+    /// The name, without unit.
     pub name: String,
     /// The unit; empty for a pure number.
     pub unit: &'static str,
@@ -64,25 +64,25 @@ impl Column {
 
 /// A row.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Row {
-    /// The step to which it leads.
+pub struct SheetRow {
+    /// The step that a click selects, if any.
     pub step: Option<usize>,
-    /// Whether it is of what is looked at.
+    /// Whether it is the row of the current step, or another highlighted row.
     pub is_present: bool,
-    /// Its values, one a column.
+    /// Its values, one per column.
     pub cells: Vec<Cell>,
 }
 
 /// A table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sheet {
-    /// What it is of.
+    /// The title, with the step if the table is about one.
     pub title: String,
-    /// Its columns.
+    /// The columns.
     pub columns: Vec<Column>,
-    /// Its rows.
-    pub rows: Vec<Row>,
-    /// Rows that only the copy has: too many to be read. Columns of their own.
+    /// The rows shown.
+    pub rows: Vec<SheetRow>,
+    /// A longer table, with its own columns, that replaces this one in the copy; `None` if the copy has the shown rows.
     pub more: Option<Box<Sheet>>,
 }
 
@@ -93,7 +93,7 @@ impl Sheet {
         Self { title: title.into(), columns, rows: Vec::new(), more: None }
     }
 
-    /// A table of other things.
+    /// A table without a step column.
     pub fn of(title: impl Into<String>, columns: Vec<Column>) -> Self {
         Self { title: title.into(), columns, rows: Vec::new(), more: None }
     }
@@ -101,15 +101,15 @@ impl Sheet {
     /// Adds the row of a step.
     pub fn step(&mut self, step: usize, present: usize, cells: impl IntoIterator<Item = Cell>) {
         let cells = std::iter::once(Cell::Number(step as f64)).chain(cells).collect();
-        self.rows.push(Row { step: Some(step), is_present: step == present, cells });
+        self.rows.push(SheetRow { step: Some(step), is_present: step == present, cells });
     }
 
-    /// Adds a row that leads nowhere.
+    /// Adds a row without a step.
     pub fn row(&mut self, is_present: bool, cells: Vec<Cell>) {
-        self.rows.push(Row { step: None, is_present, cells });
+        self.rows.push(SheetRow { step: None, is_present, cells });
     }
 
-    /// The table as CSV; rows that only the copy has replace those that are read.
+    /// The table as CSV; uses `more` if present.
     pub fn csv(&self) -> String {
         if let Some(more) = &self.more {
             return more.csv();
@@ -125,7 +125,7 @@ impl Sheet {
     }
 }
 
-/// The state of a step, and why, as it is read.
+/// The state of a step; `fault` if its files are damaged.
 pub(crate) fn state_of(row: &StepRow) -> Cell {
     let word = if row.fault { "fault" } else { &row.state };
     Cell::Word(word.to_owned())

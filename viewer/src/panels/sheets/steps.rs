@@ -1,4 +1,4 @@
-//! Whether the covariances hold, as tables: NEES and NIS by step, and the coverage.
+//! The consistency of the covariances as tables: NEES and NIS by step, and the coverage.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use sightline_session::metrics::uncertainty::{Consistency, Uncertainty};
 use crate::panels::sheets::{Cell, Column, Sheet};
 use crate::state::State;
 
-/// NEES and NIS of the run and of those that it is compared with, and how often errors lie within k σ.
+/// NEES and NIS of the run and the runs compared with it, and the share of errors within k σ.
 pub(crate) fn uncertainty(state: &State) -> Result<Vec<Sheet>, String> {
     let own = state.own_name().ok_or_else(|| state.missing_target())?;
     let names: Vec<RunName> =
@@ -23,8 +23,8 @@ pub(crate) fn uncertainty(state: &State) -> Result<Vec<Sheet>, String> {
 }
 
 fn over_steps(state: &State, shown: &[(RunName, &Uncertainty)]) -> Sheet {
-    type Part = (&'static str, fn(&Uncertainty) -> &Consistency);
-    const PARTS: [Part; 2] = [("NEES", |found| &found.nees), ("NIS", |found| &found.nis)];
+    type CovariancePart = (&'static str, fn(&Uncertainty) -> &Consistency);
+    const PARTS: [CovariancePart; 2] = [("NEES", |found| &found.nees), ("NIS", |found| &found.nis)];
     let mut columns = Vec::new();
     let mut values: BTreeMap<usize, Vec<Cell>> = BTreeMap::new();
     let count = 2 * PARTS.len() * shown.len();
@@ -35,7 +35,7 @@ fn over_steps(state: &State, shown: &[(RunName, &Uncertainty)]) -> Sheet {
             columns.push(Column::new(format!("{title}, {run}"), ""));
             columns.push(Column::new(format!("in {low:.2} to {high:.1}"), ""));
             for step in &of(found).steps {
-                let Some(own) = state.own_beside(*name, step.step) else { continue };
+                let Some(own) = state.own_aligned_step(*name, step.step) else { continue };
                 let row = values.entry(own).or_insert_with(|| vec![Cell::Nothing; count]);
                 let is_inside = (low..=high).contains(&step.value);
                 row[columns.len() - 2] = Some(step.value).into();

@@ -1,20 +1,20 @@
-//! The template of the designation: the left image about the designated pixel, before the patch of the right image.
+//! The template of the designation: the left image about the designated pixel, shown before the patch of the right image.
 //!
-//! It has the image's whole pixels; the tracker resamples the template about the sub-pixel.
+//! It consists of whole pixels of the image; the tracker resamples the template about the sub-pixel.
 
 use egui::{Rect, Sense, Ui};
 use sightline_geometry::frames::Pixel;
 use sightline_session::step::RunStep;
 
+use crate::panels::strip::hovered::{Cut, cut};
 use crate::panels::strip::patch::{paint_patch, paint_title};
-use crate::panels::strip::pointed::{Cut, cut};
 use crate::state::State;
 use crate::theme;
 
 /// The title of the patch.
 const TITLE: &str = "template";
 
-/// The designated pixel of a step that is a designation.
+/// The designated pixel; `None` if the step is not a designation.
 pub(super) fn pixel(trace: &RunStep) -> Option<Pixel> {
     trace.located().filter(|_| trace.prediction().is_none())?.left_pixel
 }

@@ -1,8 +1,8 @@
-//! The template strip: how the reference became what was compared, and what remained.
+//! The template strip: the patches from the reference template to the matched window and their difference.
 
 mod designated;
 mod patch;
-mod pointed;
+mod hovered;
 
 use egui::{Align2, Margin, Rect, Sense, Ui, pos2, vec2};
 use sightline_record::{ArrayKind, Unit, label};
@@ -18,11 +18,11 @@ use crate::panels::strip::patch::{BETWEEN, paint_patch, paint_title};
 use crate::state::State;
 use crate::{figure, theme};
 
-/// Room for the words above and below a patch, points.
+/// Heights of the text above and below a patch, points.
 const WORDS: (f32, f32) = (16.0, 18.0);
 /// Minimum side of a patch, points.
 const SIDE_MIN: f32 = 16.0;
-/// One row is kept where its patches have at least this side, points.
+/// A single row is kept if its patches have at least this side, points.
 const ONE_ROW_MIN: f32 = 64.0;
 
 /// One patch of the strip.
@@ -30,18 +30,19 @@ const ONE_ROW_MIN: f32 = 64.0;
 pub(crate) struct Patch {
     /// The array.
     pub array: ArrayName,
-    /// What it is.
+    /// The title above the patch.
     pub title: String,
-    /// What happened on the way to it.
+    /// The operation that leads to it, above the arrow.
     pub step: String,
-    /// The stage that made it.
+    /// The stage that produced it.
     pub stage: Stage,
 }
 
 /// The stages whose patches are shown.
 const STAGES: [Stage; 3] = [Stage::SCALE_ROLL, Stage::MATCH_TEMPLATE, Stage::POINT_STEREO];
 
-/// The patches of a step, in the order in which the stages declare them; those that were not reached are left out.
+/// The patches of a step, in the order in which the stages declare them; those of stages that were not reached are
+/// omitted.
 pub(crate) fn patches(trace: &RunStep) -> Vec<Patch> {
     let reached = STAGES.into_iter().filter_map(|stage| Some((stage, records::stage(stage.word())?)));
     let of_stage = |(stage, recorded): (Stage, &'static sightline_record::Stage<RunStep>)| {
@@ -56,7 +57,7 @@ pub(crate) fn patches(trace: &RunStep) -> Vec<Patch> {
     reached.flat_map(of_stage).collect()
 }
 
-/// The title of a patch, and what happened on the way to it.
+/// The title of a patch, and the operation that leads to it.
 fn caption(trace: &RunStep, array: ArrayName) -> (String, String) {
     let number = |name: &str| StageQuantity::named(name)?.number(trace);
     let applied = |[applied, computed]: [&str; 2], words: fn(f64) -> String| {
@@ -111,9 +112,9 @@ impl Panel for Strip {
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let patches = state.trace().map(patches).unwrap_or_default();
     let area = ui.available_rect_before_wrap();
-    // A figure has room for the pointed pixel only while there is one.
-    let has_pointer = state.trace().is_some_and(|trace| pointed::is_there(trace))
-        && (!figure::is_on_paper() || state.pointed_left().is_some());
+    // A figure includes the pointed pixel only while there is one.
+    let has_pointer = state.trace().is_some_and(|trace| hovered::is_there(trace))
+        && (!figure::is_on_paper() || state.hovered_left().is_some());
     let template = state.trace().and_then(designated::pixel).filter(|_| !patches.is_empty());
     let first = usize::from(template.is_some());
     let frames = frames(area, first + patches.len() + usize::from(has_pointer));
@@ -127,19 +128,19 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         show_patch(ui, state, patch, frame, out);
     }
     if let Some(&frame) = frames.last().filter(|_| has_pointer) {
-        arrow(ui, frame, &pointed::score(state));
-        pointed::show(ui, state, frame);
+        arrow(ui, frame, &hovered::score(state));
+        hovered::show(ui, state, frame);
     }
     ui.advance_cursor_after_rect(area);
 }
 
-/// The squares of `count` patches in reading order: in one row, or in as many rows as give the largest squares where
-/// those of one row would be small.
+/// The squares of `count` patches in reading order: in one row, or, if its squares would be small, in the number of rows
+/// with the largest squares.
 fn frames(area: Rect, count: usize) -> Vec<Rect> {
     if count == 0 {
         return Vec::new();
     }
-    // A row below another begins with an arrow.
+    // With several rows, each row begins with an arrow.
     let arrows = |rows: usize, columns: usize| if rows > 1 { columns } else { columns - 1 } as f32;
     let side = |rows: usize| {
         let columns = count.div_ceil(rows);
@@ -161,7 +162,7 @@ fn frames(area: Rect, count: usize) -> Vec<Rect> {
     (0..count).map(frame).collect()
 }
 
-/// The arrow before a patch with what happened on the way to it.
+/// The arrow before a patch with the operation that leads to it.
 fn arrow(ui: &Ui, frame: Rect, words: &str) {
     let middle = frame.left_center() - vec2(BETWEEN / 2.0, 0.0);
     let painter = ui.painter();

@@ -7,10 +7,10 @@ use crate::drawing::view2d;
 use crate::panels::numbers::fixed;
 use crate::theme;
 
-/// Room for the arrow and the number between two patches, points.
+/// Width of the arrow and its text between two patches, points.
 pub(super) const BETWEEN: f32 = 68.0;
 
-/// What a patch is, above it.
+/// The title above a patch.
 pub(super) fn paint_title(ui: &Ui, frame: Rect, title: &str) {
     let above = frame.center_top() - vec2(0.0, 3.0);
     ui.painter().text(above, Align2::CENTER_BOTTOM, title, theme::image_font(), theme::text());

@@ -1,4 +1,4 @@
-//! What a stop shows on a state band, by colour, pattern and word.
+//! The cells of a state band: the state of a stop by colour, pattern and word.
 
 use egui::{Color32, Painter, Rect, Shape, Stroke, pos2, vec2};
 use sightline_session::view::{RunView, TargetView};
@@ -6,7 +6,7 @@ use sightline_session::view::{RunView, TargetView};
 use crate::state::{State, row_of};
 use crate::theme;
 
-/// What a cell shows.
+/// The state of a stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Cell {
     /// Before the target was picked, or without a target.
@@ -42,7 +42,7 @@ impl Cell {
         }
     }
 
-    /// How serious it is: of steps that share a column the most serious is shown.
+    /// Severity: of the steps in one column the most severe is shown.
     pub(crate) const fn weight(self) -> u8 {
         match self {
             Self::Before => 0,
@@ -57,7 +57,7 @@ impl Cell {
     }
 }
 
-/// The cell of a stop in the run that is looked at.
+/// The cell of a stop in the selected run.
 pub(crate) fn cell(state: &State, step: usize) -> Cell {
     state.target().map_or(Cell::Before, |target| cell_of(target, state.run(), step))
 }
@@ -81,7 +81,7 @@ pub(crate) fn cell_of(target: &TargetView, run: Option<&RunView>, step: usize) -
     }
 }
 
-/// Paints a stretch of equal cells.
+/// Paints a span of equal cells.
 pub(crate) fn paint(painter: &Painter, frame: Rect, cell: Cell) {
     let fill = |colour: Color32, strength: f32| {
         painter.rect_filled(frame, 1.0, colour.gamma_multiply(strength));
@@ -114,7 +114,7 @@ pub(crate) fn paint(painter: &Painter, frame: Rect, cell: Cell) {
     }
 }
 
-/// Dashed rows: three on a high band, one on a low one.
+/// Dashed rows: three on a high band, one on a thin one.
 fn dashes(painter: &Painter, frame: Rect, colour: Color32) {
     let rows = if frame.height() > 14.0 { 3 } else { 1 };
     for i in 0..rows {
@@ -133,7 +133,7 @@ fn dashes(painter: &Painter, frame: Rect, colour: Color32) {
 fn hatch(painter: &Painter, frame: Rect, colour: Color32) {
     let inside = painter.with_clip_rect(frame.intersect(painter.clip_rect()));
     let slant = frame.height();
-    // Lines lie on one raster, so that many short stretches have no more of them than one long one.
+    // Lines are on a common grid, so that many short spans have no more of them than one long span.
     let first = ((frame.left() - slant) / 6.0).ceil() as i32;
     let last = (frame.right() / 6.0).floor() as i32;
     let crossing = (first..=last).filter(|line| frame.width() >= 6.0 || *line == last);

@@ -1,4 +1,5 @@
-//! The filmstrip of the timeline: the matched windows of the run, each above its step. A long drive shows every so many steps.
+//! The filmstrip of the timeline: the matched windows of the run, each above its step; for long drives only every n-th
+//! step.
 
 use egui::{Painter, Rect, StrokeKind, pos2, vec2};
 use sightline_session::step::StepRow;
@@ -12,16 +13,16 @@ use crate::theme;
 /// Height of the filmstrip, points; its windows are square.
 pub(super) const FILM: f32 = 25.0;
 
-/// The most windows.
+/// Maximum number of windows.
 const WINDOWS: usize = 48;
 
-/// The rows whose windows the filmstrip shows: as many as there is memory for, evenly over the drive.
+/// The rows whose windows the filmstrip shows: every n-th step, such that at most `WINDOWS` are loaded.
 pub(crate) fn rows<'a>(state: &State, run: &'a RunView) -> impl Iterator<Item = &'a StepRow> {
     let every = state.stop_count().div_ceil(WINDOWS).max(1);
     run.rows.iter().filter(move |row| row.step % every == 0)
 }
 
-/// Paints the windows that are there, as many as fit beside each other, and a frame around that of the present step.
+/// Paints the loaded windows, as many as fit side by side; the window of the current step has an accented frame.
 pub(super) fn paint(painter: &Painter, strip: Rect, state: &State, scale: &Scale) {
     let Some(run) = state.run() else { return };
     let side = strip.height() - 2.0;

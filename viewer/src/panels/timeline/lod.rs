@@ -1,16 +1,17 @@
-//! Which steps fall on which column of the screen, so that a drive of any length is drawn by columns and not by steps.
+//! The level of detail of the timeline: maps steps to screen columns, so that the drawing cost does not depend on the
+//! drive's length.
 //!
-//! A column shows the most serious of its steps: a single lost step among a hundred stays visible. Neighbouring columns
-//! that show the same become one span, so that there are never more spans than columns of [`COLUMN`] points.
+//! A column shows the most severe of its steps: a single lost step among a hundred stays visible. Neighbouring columns
+//! with the same state are merged into one span, so that there are at most as many spans as columns of [`COLUMN`] points.
 
 use egui::Rangef;
 
 use crate::panels::timeline::Cell;
 
-/// Width of a column, points: what can be told apart.
+/// Width of a column, points: the smallest distinguishable one.
 pub(crate) const COLUMN: f32 = 2.0;
 
-/// Where the steps of a drive lie on the screen.
+/// The mapping of steps to screen positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Scale {
     left: f32,
@@ -19,7 +20,7 @@ pub(crate) struct Scale {
 }
 
 impl Scale {
-    /// `count` steps, at least one, over a stretch of the screen.
+    /// The scale of `count` steps, at least one, over a horizontal screen range.
     pub(crate) fn new(stretch: Rangef, count: usize) -> Self {
         Self { left: stretch.min, width: stretch.span().max(1.0), count: count.max(1) }
     }
@@ -29,28 +30,28 @@ impl Scale {
         self.width / self.count as f32
     }
 
-    /// Where a step begins.
+    /// The left end of a step, points.
     pub(crate) fn left_of(&self, step: usize) -> f32 {
         self.left + self.width * (step as f32 / self.count as f32)
     }
 
-    /// The middle of a step.
+    /// The middle of a step, points.
     pub(crate) fn middle_of(&self, step: usize) -> f32 {
         (self.left_of(step) + self.left_of(step + 1)) / 2.0
     }
 
-    /// The step under a place; the nearest one beside the drive.
+    /// The step at a screen position; the nearest one outside the drive.
     pub(crate) fn step_at(&self, x: f32) -> usize {
         let share = f64::from((x - self.left) / self.width).clamp(0.0, 1.0);
         ((share * self.count as f64) as usize).min(self.count - 1)
     }
 
-    /// How many columns there are: one a step where steps are wide enough.
+    /// The number of columns; one per step if steps are wide enough.
     fn columns(&self) -> usize {
         ((self.width / COLUMN) as usize).clamp(1, self.count)
     }
 
-    /// The stretches of steps that show the same.
+    /// The spans of equal cells.
     pub(crate) fn spans(&self, cell: impl Fn(usize) -> Cell) -> Vec<Span> {
         let columns = self.columns();
         let mut spans: Vec<Span> = Vec::new();
@@ -66,7 +67,8 @@ impl Scale {
         spans
     }
 
-    /// Those of `steps` (in order) that are at least `gap` points apart, each with how many stand for it.
+    /// Selects from `steps` (ascending) those at least `gap` points apart, each with the number of steps that it
+    /// represents.
     pub(crate) fn thinned(&self, steps: impl IntoIterator<Item = usize>, gap: f32) -> Vec<(usize, usize)> {
         let mut kept: Vec<(usize, usize)> = Vec::new();
         for step in steps {
@@ -79,14 +81,14 @@ impl Scale {
     }
 }
 
-/// A stretch of steps that show the same.
+/// A span of steps with the same state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Span {
     /// The first step.
     pub from: usize,
-    /// The first step after it.
+    /// The first step after the span.
     pub to: usize,
-    /// What they show.
+    /// The state of its steps.
     pub cell: Cell,
 }
 

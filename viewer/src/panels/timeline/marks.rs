@@ -1,8 +1,8 @@
-//! What stands over and across the state bands: events, hits of breakpoints, the loop, the playhead, numbers of steps.
+//! Marks on and above the state bands: events, breakpoint hits, the loop, the playhead, and step numbers.
 
 use egui::{Align2, Painter, Rect, Shape, Stroke, pos2, vec2};
 
-use crate::breakpoints::Asking;
+use crate::breakpoints::BreakpointState;
 use crate::breakpoints::panel::mark;
 use crate::drawing::overlay::paint_mark;
 use crate::panels::timeline::lod::Scale;
@@ -13,28 +13,28 @@ use crate::theme;
 pub(super) const LANE: f32 = 16.0;
 /// Height of the step numbers, points.
 pub(super) const NUMBERS: f32 = 15.0;
-/// Room for one mark of a breakpoint, points: nearer ones share it.
+/// Width of a breakpoint's mark, points: nearer hits share one.
 const MARK: f32 = 9.0;
-/// Least distance of two event ticks, points.
+/// Minimum distance of two event ticks, points.
 const TICK: f32 = 3.0;
 
-/// A place of the lane at which breakpoints hit.
+/// A position in the lane with breakpoint hits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Hit {
     /// The first of its steps.
     pub step: usize,
-    /// Hits that stand here.
+    /// Number of hits at this position.
     pub count: usize,
-    /// The breakpoint, by its place in the list; none where several share the place.
+    /// Index of the breakpoint in the list; `None` if several share the position.
     pub only: Option<usize>,
 }
 
-/// The hits of all breakpoints in the run that is looked at, as far apart as their marks need.
+/// The hits of all breakpoints in the selected run, merged to the distance that their marks need.
 pub(crate) fn hits(state: &State, scale: &Scale) -> Vec<Hit> {
     let Some(target) = state.cursor.target else { return Vec::new() };
     let mut places: Vec<Hit> = Vec::new();
-    for (at, breakpoint) in state.ask.watched() {
-        let steps = Asking::hits(breakpoint, target, state.cursor.run).iter().copied();
+    for (at, breakpoint) in state.breakpoints.watched() {
+        let steps = BreakpointState::hits(breakpoint, target, state.cursor.run).iter().copied();
         places.extend(scale.thinned(steps, MARK).into_iter().map(|(step, count)| Hit {
             step,
             count,
@@ -55,14 +55,14 @@ pub(crate) fn hits(state: &State, scale: &Scale) -> Vec<Hit> {
     joined
 }
 
-/// Paints the step that is pointed at, here or in another panel.
-pub(crate) fn pointed(painter: &Painter, all: Rect, step: usize, scale: &Scale) {
+/// Paints the step under the pointer, here or in another panel.
+pub(crate) fn hovered(painter: &Painter, all: Rect, step: usize, scale: &Scale) {
     let x = scale.middle_of(step);
     let ends = [pos2(x, all.top()), pos2(x, all.bottom())];
     painter.extend(Shape::dotted_line(&ends, theme::accent(), 4.0, 1.0));
 }
 
-/// Paints the lane above the bands: event ticks and breakpoints' marks, with a number where one stands for several.
+/// Paints the lane above the bands: event ticks, and breakpoint marks with a number if a mark represents several hits.
 pub(crate) fn lane(painter: &Painter, lane: Rect, state: &State, scale: &Scale) {
     painter.hline(lane.x_range(), lane.bottom() - 0.5, Stroke::new(1.0, theme::line()));
     let events = state.run().map(events).unwrap_or_default();
@@ -91,9 +91,9 @@ pub(crate) fn lane(painter: &Painter, lane: Rect, state: &State, scale: &Scale) 
     }
 }
 
-/// Paints the loop: what is outside is shaded, its ends are brackets.
+/// Paints the loop: steps outside are shaded, its ends are brackets.
 pub(crate) fn loop_range(painter: &Painter, bands: Rect, state: &State, scale: &Scale, count: usize) {
-    let play = &state.ask.play;
+    let play = &state.breakpoints.play;
     if play.loop_in.is_none() && play.loop_out.is_none() {
         return;
     }
@@ -111,7 +111,7 @@ pub(crate) fn loop_range(painter: &Painter, bands: Rect, state: &State, scale: &
     }
 }
 
-/// Paints the playhead: an outline of the step where it is wide, else a line, and a triangle above.
+/// Paints the playhead: an outline if the step is wide, else a line; with a triangle above.
 pub(crate) fn playhead(painter: &Painter, bands: Rect, step: usize, scale: &Scale) {
     let stroke = Stroke::new(2.0, theme::accent());
     let frame = Rect::from_x_y_ranges(scale.left_of(step)..=scale.left_of(step + 1), bands.y_range());
@@ -136,7 +136,7 @@ pub(crate) fn numbers(painter: &Painter, below: Rect, count: usize, scale: &Scal
     }
 }
 
-/// A line under the steps whose images are there.
+/// A line under the steps whose images are rendered.
 pub(crate) fn rendered(painter: &Painter, y: f32, scale: &Scale, is_ready: impl Fn(usize) -> bool) {
     use crate::panels::timeline::Cell;
     let ready = |step: usize| if is_ready(step) { Cell::Before } else { Cell::Unknown };
@@ -146,7 +146,7 @@ pub(crate) fn rendered(painter: &Painter, y: f32, scale: &Scale, is_ready: impl 
     }
 }
 
-/// The lane's middle colour while the pointer is over it.
+/// A faint mark in the lane at the step under the pointer.
 pub(crate) fn lane_hint(painter: &Painter, lane: Rect, x: f32) {
     let at = pos2(x, lane.top() + LANE / 2.0 - 2.0);
     painter.circle_stroke(at, 4.0, Stroke::new(1.5, theme::weak()));

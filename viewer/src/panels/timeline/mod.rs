@@ -1,10 +1,10 @@
-//! The timeline: a lane of events and breakpoints' hits, a filmstrip of matched windows, a state band for each run, curves of
-//! score and error, the loop, and the playhead.
+//! The timeline: a lane of events and breakpoint hits, a filmstrip of matched windows, a state band for each run, curves
+//! of score and error, the loop, and the playhead.
 //!
-//! A click goes to the step, a drag scrubs, a click in the lane breaks at the step. Everything is drawn by columns of
-//! the screen ([`lod`]): the shapes of a frame are bounded by the width, whatever the number of steps. Counted at 1400
-//! points with five runs that change their state at every column and hits at every second step: about 7,000 shapes for
-//! 1,000 steps as for 10,000 and 40,000 (`tests/timelines.rs` holds a bound of 13,220).
+//! A click selects the step, a drag scrubs, a click in the lane sets a breakpoint at the step. Everything is drawn by
+//! columns of the screen ([`lod`]): the number of shapes per frame is bounded by the width, independent of the number of
+//! steps. At 1400 points, with five runs that change state at every column and hits at every second step, it is about
+//! 7,000 for 1,000, 10,000 and 40,000 steps (`tests/timelines.rs` asserts a bound of 13,220).
 
 pub(crate) mod cells;
 mod curves;
@@ -20,23 +20,23 @@ pub(crate) use self::cells::{Cell, cell};
 use self::film::FILM;
 use self::lod::{Scale, Span};
 use self::marks::{LANE, NUMBERS};
-use crate::breakpoints::Ask;
+use crate::breakpoints::BreakpointCommand;
 use crate::command::{Command, Go};
-use crate::pointed::Pointed;
+use crate::hovered::Hovered;
 use crate::state::{State, run_letter};
 use crate::theme;
 
-/// Height of the band of the run that is looked at, points.
+/// Height of the selected run's band, points.
 const BAND: f32 = 18.0;
-/// Height of the band of another run, points.
+/// Height of any other band, points.
 const LOW_BAND: f32 = 10.0;
-/// Room between two bands, points.
+/// Space between two bands, points.
 const GAP: f32 = 2.0;
-/// Room for the bands' names on the left, points.
+/// Width of the bands' names on the left, points.
 const GUTTER: f32 = 78.0;
-/// How many runs of the target have a band, and how many other targets.
+/// Maximum number of bands of the target's runs, and of bands of other targets.
 const BANDS: usize = 5;
-/// How many stretches of equal states the sentence about the timeline names.
+/// Maximum number of state spans in the description of the timeline.
 const WORDS: usize = 6;
 
 /// One state band.
@@ -53,7 +53,7 @@ impl Band<'_> {
     }
 }
 
-/// The bands, from above: the runs of the target, the selected one always among them, then the other targets.
+/// The bands, from top to bottom: the target's runs, always including the selected one, then the other targets.
 fn bands(state: &State) -> Vec<Band<'_>> {
     let (Some(session), Some(target)) = (&state.session, state.target()) else { return Vec::new() };
     let selected = target.runs.iter().position(|run| run.number == state.cursor.run).unwrap_or(0);
@@ -64,8 +64,10 @@ fn bands(state: &State) -> Vec<Band<'_>> {
         is_selected: run.number == state.cursor.run,
         name: format!("run {}", run_letter(run.number)),
     });
-    let others =
-        session.targets.iter().filter(|other| state.ask.shows_others && other.number != target.number);
+    let others = session
+        .targets
+        .iter()
+        .filter(|other| state.breakpoints.shows_others && other.number != target.number);
     let others = others.take(BANDS).map(|other| Band {
         target: other,
         run: other.runs.last(),
@@ -75,7 +77,7 @@ fn bands(state: &State) -> Vec<Band<'_>> {
     runs.chain(others).collect()
 }
 
-/// Height of the timeline as it is now, points.
+/// Current height of the timeline, points.
 pub(crate) fn height(state: &State) -> f32 {
     let bands: f32 = bands(state).iter().map(|band| band.height() + GAP).sum();
     LANE + FILM + bands.max(BAND + GAP) + curves::HEIGHT + NUMBERS
@@ -108,24 +110,24 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     crate::notes::marks::timeline(&painter, lane, state, &scale);
     marks::loop_range(&painter, all, state, &scale, count);
     marks::playhead(&painter, all, state.cursor.step.min(count - 1), &scale);
-    let pointed = response.hover_pos().or(response.interact_pointer_pos());
-    if let Some(pointer) = pointed.filter(|at| lane.contains(*at)) {
+    let hovered = response.hover_pos().or(response.interact_pointer_pos());
+    if let Some(pointer) = hovered.filter(|at| lane.contains(*at)) {
         marks::lane_hint(&painter, lane, scale.middle_of(scale.step_at(pointer.x)));
     }
     point(&response, state, &bands, &frames, (lane, &scale), out);
     keys_and_readers(ui, &response, state, &bands, out);
-    if let Some(step) = state.pointed_step() {
-        marks::pointed(&painter, all, step, &scale);
+    if let Some(step) = state.hovered_step() {
+        marks::hovered(&painter, all, step, &scale);
     }
     if let Some(pointer) = response.hover_pos() {
         let step = scale.step_at(pointer.x);
-        out.push(Command::Point(Pointed::Step(step)));
+        out.push(Command::Hover(Hovered::Step(step)));
         let band = frames.iter().position(|frame| frame.y_range().contains(pointer.y)).map(|at| &bands[at]);
         response.on_hover_text_at_pointer(words(state, band, step, lane.contains(pointer)));
     }
 }
 
-/// Paints the bands with their names. Returns where they are.
+/// Paints the bands with their names. Returns their areas.
 fn paint_bands(
     painter: &Painter,
     state: &State,
@@ -168,7 +170,7 @@ fn paint_bands(
 }
 
 fn paint_spans(painter: &Painter, spans: &[Span], band: Rect, scale: &Scale) {
-    // Wide steps stand apart; narrow ones touch.
+    // Wide steps have a gap; narrow ones touch.
     let gap = if scale.step_width() > 6.0 { 1.0 } else { 0.0 };
     for span in spans {
         let step_frames = if gap > 0.0 { span.from..span.to } else { span.from..span.from + 1 };
@@ -180,7 +182,8 @@ fn paint_spans(painter: &Painter, spans: &[Span], band: Rect, scale: &Scale) {
     }
 }
 
-/// The states of a run as a band too thin for patterns; what is not well is lower, so that the shape tells it too.
+/// The states of a run as a band too thin for patterns; all states but tracking are lower, so that shape shows them as
+/// well.
 pub(crate) fn thin_band(
     painter: &Painter,
     band: Rect,
@@ -204,12 +207,12 @@ pub(crate) fn thin_band(
     }
 }
 
-/// The word of each stretch of equal cells at its beginning, where it fits.
+/// The word of each span of equal cells at its left end, if it fits.
 fn paint_words(painter: &Painter, spans: &[Span], band: Rect, scale: &Scale) {
     for span in spans {
         let left = scale.left_of(span.from);
         let room = scale.left_of(span.to) - left;
-        // The shortest word needs more than this: most stretches of a long drive are passed over here.
+        // No word fits into less: this skips most spans of a long drive without a layout.
         if room < 34.0 {
             continue;
         }
@@ -225,7 +228,7 @@ fn paint_words(painter: &Painter, spans: &[Span], band: Rect, scale: &Scale) {
     }
 }
 
-/// What the pointer asks for.
+/// Pushes the commands of clicks and drags.
 fn point(
     response: &Response,
     state: &State,
@@ -237,7 +240,7 @@ fn point(
     let Some(pointer) = response.interact_pointer_pos() else { return };
     let step = scale.step_at(pointer.x);
     if response.clicked() && lane.contains(pointer) {
-        out.push(Command::Ask(Ask::BreakAt(step)));
+        out.push(Command::Breakpoints(BreakpointCommand::BreakAt(step)));
         return;
     }
     if response.clicked()
@@ -245,14 +248,14 @@ fn point(
             frames.iter().position(|frame| frame.y_range().contains(pointer.y)).map(|at| &bands[at])
         && let Some(run) = band.run.filter(|_| !band.is_selected)
     {
-        out.push(Command::Look { target: band.target.number, run: run.number });
+        out.push(Command::SelectRun { target: band.target.number, run: run.number });
     }
     if (response.clicked() || response.dragged()) && step != state.cursor.step {
         out.push(Command::Go(Go::Step(step)));
     }
 }
 
-/// What who cannot see it hears, and the keys of who has the keyboard here.
+/// The description for screen readers, and the keys while the timeline has the focus.
 fn keys_and_readers(ui: &Ui, response: &Response, state: &State, bands: &[Band<'_>], out: &mut Vec<Command>) {
     response.widget_info(|| WidgetInfo::slider(true, state.cursor.step as f64, in_words(state, bands)));
     if response.has_focus() {
@@ -268,7 +271,7 @@ fn keys_and_readers(ui: &Ui, response: &Response, state: &State, bands: &[Band<'
     }
 }
 
-/// The timeline as a sentence.
+/// The timeline in words.
 fn in_words(state: &State, bands: &[Band<'_>]) -> String {
     let (step, last) = (state.cursor.step, state.stop_count().saturating_sub(1));
     let mut words = format!("timeline: step {step} of {last}, {}", cell(state, step).word());
@@ -286,7 +289,7 @@ fn in_words(state: &State, bands: &[Band<'_>]) -> String {
             words += " and further changes";
         }
     }
-    let hits: usize = state.ask.watched().map(|(_, breakpoint)| breakpoint.count).sum();
+    let hits: usize = state.breakpoints.watched().map(|(_, breakpoint)| breakpoint.count).sum();
     if hits > 0 {
         words += &format!("; {hits} hits of breakpoints in all runs");
     }
@@ -297,7 +300,7 @@ fn is_ready(state: &State, step: usize) -> bool {
     state.traverse.as_ref().is_some_and(|t| t.stops.get(step).is_some_and(|stop| stop.ready))
 }
 
-/// What a stop is, in words.
+/// The description of a stop.
 fn words(state: &State, band: Option<&Band<'_>>, step: usize, in_lane: bool) -> String {
     let selected = || state.target().map(|target| (target, state.run()));
     let shown = band.map(|band| (band.target, band.run)).or_else(selected);
@@ -344,7 +347,7 @@ fn words(state: &State, band: Option<&Band<'_>>, step: usize, in_lane: bool) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tests::ask::breakpoint;
+    use crate::tests::breakpoints::breakpoint;
     use crate::tests::fixture;
 
     #[test]
@@ -355,7 +358,7 @@ mod tests {
         target.runs.push(second);
         let mut hit = breakpoint(0, "ncc < 0.6", &[3]);
         hit.hits[0].run = 1;
-        state.ask.breakpoints = vec![hit];
+        state.breakpoints.list = vec![hit];
         let bands = bands(&state);
         let words = |run: usize| words(&state, Some(&bands[run]), 3, false);
         assert!(!words(0).contains("◆ ncc < 0.6"), "{}", words(0));

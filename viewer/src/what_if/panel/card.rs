@@ -1,4 +1,4 @@
-//! The ghost of what is tried, dashed over the image, and a small card that says what changed.
+//! The result of a trial: the ghost, dashed over the image, and a small card that lists the changes.
 
 use egui::{Align, Button, Frame, Label, Layout, Margin, Pos2, Rect, RichText, Ui, UiBuilder, vec2};
 use sightline_session::marks::square;
@@ -7,7 +7,7 @@ use sightline_session::why::gates;
 use sightline_session::why::words::{capitalised, setting_name, signed};
 
 use crate::command::Command;
-use crate::drawing::overlay::{Line, Mark, Overlay};
+use crate::drawing::overlay::{Mark, Overlay, StrokeStyle};
 use crate::drawing::view2d::Canvas;
 use crate::state::State;
 use crate::state::state_of;
@@ -15,31 +15,31 @@ use crate::theme;
 use crate::what_if::Trial;
 use crate::what_if::panel::place;
 use crate::what_if::panel::place::Edge;
-use crate::why::Ask;
+use crate::why::WhyCommand;
 
 /// Width of the card, points.
 const WIDTH: f32 = 230.0;
 
-/// Paints what was tried.
+/// Paints the ghost of a trial.
 pub(crate) fn ghost(canvas: &Canvas, trial: &Trial) {
     let Some(ghost) = &trial.ghost else { return };
     let overlay = Overlay::new(&canvas.painter, &canvas.transform);
     if let Some(window) = ghost.search_window {
-        overlay.rectangle(window, theme::ghost(), Line::Dashed);
+        overlay.rectangle(window, theme::ghost(), StrokeStyle::Dashed);
     }
     if let Some(pixel) = ghost.predicted_left.filter(|_| trial.what_if.prediction_px.is_some()) {
         overlay.mark(pixel, Mark::Cross, theme::ghost());
         if let Some(covariance) = &ghost.predicted_covariance_px2 {
-            overlay.ellipse(pixel, covariance, 3.0, theme::ghost(), Line::Dotted);
+            overlay.ellipse(pixel, covariance, 3.0, theme::ghost(), StrokeStyle::Dotted);
         }
     }
     if let Some(pixel) = ghost.left_pixel {
         if let Some(map) = &ghost.prepared_from_template {
             let quad = square(pixel, ghost.template_size_px, map);
-            overlay.outline(&quad, theme::ghost(), Line::Dashed);
+            overlay.outline(&quad, theme::ghost(), StrokeStyle::Dashed);
         }
         if let Some(covariance) = &ghost.left_covariance_px2 {
-            overlay.ellipse(pixel, covariance, 3.0, theme::ghost(), Line::Dashed);
+            overlay.ellipse(pixel, covariance, 3.0, theme::ghost(), StrokeStyle::Dashed);
         }
         overlay.mark(pixel, Mark::Diamond, theme::ghost());
     }
@@ -58,7 +58,7 @@ pub(crate) fn over(ui: &mut Ui, canvas: &Canvas, at: Pos2, state: &State, out: &
     place::remember(ui, shown.response.rect.size());
 }
 
-/// Shows it as a strip along an edge of the image.
+/// Shows the card as a strip along an edge of the image.
 pub(crate) fn strip(ui: &mut Ui, canvas: &Canvas, edge: Edge, state: &State, out: &mut Vec<Command>) {
     let Some(trial) = state.trial() else { return };
     let area = canvas.transform.rect;
@@ -72,7 +72,7 @@ pub(crate) fn strip(ui: &mut Ui, canvas: &Canvas, edge: Edge, state: &State, out
     frame().show(&mut inside, |ui| {
         ui.set_min_size(vec2(ui.available_width(), place::STRIP - 12.0));
         ui.spacing_mut().item_spacing.y = 2.0;
-        // The buttons come first: what is computed meanwhile must not move them.
+        // The buttons are first, so that results that arrive later do not move them.
         ui.horizontal_wrapped(|ui| {
             buttons(ui, out);
             what(ui, state, trial);
@@ -90,7 +90,7 @@ fn contents(ui: &mut Ui, state: &State, trial: &Trial, out: &mut Vec<Command>) {
     ui.horizontal_wrapped(|ui| buttons(ui, out));
 }
 
-/// What is tried and what comes of it.
+/// Shows the changes and their result.
 fn what(ui: &mut Ui, state: &State, trial: &Trial) {
     ui.label(theme::title(&format!("what if, step {}", trial.of.step)));
     for line in changes(state, trial) {
@@ -110,21 +110,21 @@ fn what(ui: &mut Ui, state: &State, trial: &Trial) {
 fn buttons(ui: &mut Ui, out: &mut Vec<Command>) {
     let run = ui.add(Button::new("Run from here as branch").min_size(vec2(0.0, 24.0)));
     if run.on_hover_text("Nothing recorded is overwritten. Key R").clicked() {
-        out.push(Command::Why(Ask::Branch));
+        out.push(Command::Why(WhyCommand::Branch));
     }
     let discard = ui.add(Button::new("Discard").min_size(vec2(0.0, 24.0)));
     if discard.accessible_name("discard what if").on_hover_text("Key Esc").clicked() {
-        out.push(Command::Why(Ask::Discard));
+        out.push(Command::Why(WhyCommand::Discard));
     }
 }
 
-/// Words that may be long: beside others they break where the row does.
+/// Shows words that may be long; in a row they wrap with it.
 fn sentence(ui: &mut Ui, words: RichText) {
     let label = Label::new(words);
     ui.add(if ui.layout().is_horizontal() { label } else { label.wrap() });
 }
 
-/// Pieces that stand beside each other: in a strip, where everything does, they are part of its row.
+/// Shows pieces beside each other; in a strip they become part of its row.
 fn flow(ui: &mut Ui, contents: impl FnOnce(&mut Ui)) {
     if ui.layout().is_horizontal() {
         contents(ui);
@@ -133,7 +133,7 @@ fn flow(ui: &mut Ui, contents: impl FnOnce(&mut Ui)) {
     }
 }
 
-/// What is changed against the run.
+/// The changes against the run, one per line.
 fn changes(state: &State, trial: &Trial) -> Vec<String> {
     let group = |key: &str| state.settings.iter().find(|info| info.key == key).map(|info| info.group.clone());
     let settings = trial.what_if.settings.iter().map(|(key, value)| {
@@ -158,7 +158,7 @@ fn transition(recorded: &str, tried: &str) -> String {
     if recorded == tried.to_lowercase() { tried } else { format!("{} → {tried}", capitalised(recorded)) }
 }
 
-/// State, score and place of the ghost, with what changed.
+/// Shows state, score and position of the ghost, with their changes.
 fn result(ui: &mut Ui, ghost: &Ghost, is_newest: bool) {
     let tracking = state_of(&ghost.row);
     let deltas = &ghost.deltas;

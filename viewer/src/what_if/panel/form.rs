@@ -1,4 +1,4 @@
-//! The same by sliders, for hands and readers that do not drag in images.
+//! The handles of the image as sliders, for users who cannot drag in images.
 
 use egui::{Slider, Ui};
 use serde_json::json;
@@ -9,13 +9,13 @@ use sightline_track::trace::StepTrace;
 use crate::command::Command;
 use crate::state::State;
 use crate::theme;
-use crate::what_if::panel::tried::{predicted, side};
-use crate::why::Ask;
+use crate::what_if::panel::values::{predicted, side};
+use crate::why::WhyCommand;
 
-/// How far the sliders put a prediction, px to either side.
+/// Range of the prediction sliders, px in either direction.
 const REACH_PX: f64 = 200.0;
 
-/// Sliders of sizes and prediction, with the buttons that use or drop what is tried.
+/// Shows the sliders of the sizes and the prediction, and the buttons that apply or discard the trial.
 pub(crate) fn form(ui: &mut Ui, state: &State, trace: &StepTrace, out: &mut Vec<Command>) {
     if state.tracker() == TrackerKind::Template {
         for (name, key, high) in
@@ -35,10 +35,10 @@ pub(crate) fn form(ui: &mut Ui, state: &State, trace: &StepTrace, out: &mut Vec<
         let state_word = trial.ghost.as_ref().map_or("computing …", |ghost| ghost.row.state.as_str());
         ui.label(format!("this step would be: {state_word}"));
         if ui.button("Run as branch").on_hover_text("Key R").clicked() {
-            out.push(Command::Why(Ask::Branch));
+            out.push(Command::Why(WhyCommand::Branch));
         }
         if ui.button("Drop").on_hover_text("Key Esc").clicked() {
-            out.push(Command::Why(Ask::Discard));
+            out.push(Command::Why(WhyCommand::Discard));
         }
     });
 }
@@ -58,11 +58,11 @@ fn size(
         let odd = number | 1;
         let in_run = state.setting("template", key).and_then(|value| value.as_u64());
         let value = (in_run != Some(odd)).then(|| json!(odd));
-        out.push(Command::Why(Ask::Change { key: key.to_owned(), value }));
+        out.push(Command::Why(WhyCommand::Change { key: key.to_owned(), value }));
     }
 }
 
-/// Where the prediction is put, against where the run has it.
+/// Shows the displacement of the prediction from the one of the run.
 fn displacement(ui: &mut Ui, state: &State, trace: &StepTrace, out: &mut Vec<Command>) {
     let recorded = trace.point_mast.predicted_left;
     let Some((recorded, now)) = recorded.zip(predicted(state, trace)) else { return };
@@ -77,6 +77,6 @@ fn displacement(ui: &mut Ui, state: &State, trace: &StepTrace, out: &mut Vec<Com
         let tenth = |v: f64| (v * 10.0).round() / 10.0;
         let to = Pixel::new(tenth(recorded.x + by[0]), tenth(recorded.y + by[1]));
         let is_back = by.iter().all(|v| v.abs() < 0.05);
-        out.push(Command::Why(Ask::Displace((!is_back).then_some(to))));
+        out.push(Command::Why(WhyCommand::Displace((!is_back).then_some(to))));
     }
 }

@@ -10,19 +10,19 @@ use crate::command::Command;
 use crate::drawing::view2d::Canvas;
 use crate::state::State;
 use crate::theme;
-use crate::what_if::panel::tried::{predicted, side};
-use crate::why::Ask;
+use crate::what_if::panel::values::{predicted, side};
+use crate::why::WhyCommand;
 
-/// Side of the area in which a handle is taken, points.
+/// Side of a handle's sensitive area, points.
 const TAKEN: f32 = 24.0;
-/// Half the side of the mark, points.
+/// Half the side of a handle's mark, points.
 const MARK: f32 = 4.0;
-/// The least sizes of search window and template, px.
+/// Minimum sizes of search window and template, px.
 const LEAST: [u64; 2] = [21, 5];
-/// Their largest, px.
+/// Maximum sizes of search window and template, px.
 const MOST: [u64; 2] = [1023, 101];
 
-/// Shows the handles and takes what is dragged.
+/// Shows the handles and handles their drags.
 pub(crate) fn show(ui: &mut Ui, canvas: &Canvas, state: &State, trace: &StepTrace, out: &mut Vec<Command>) {
     let Some(centre) = predicted(state, trace) else { return };
     let window = side(state, "search_window_px");
@@ -62,7 +62,7 @@ impl Corner {
         let at = self.centre.offset(half, half);
         let Some(response) = handle(ui, canvas, self.key, at, colour) else { return };
         response.widget_info(|| WidgetInfo::slider(true, side as f64, format!("{} handle, px", self.name)));
-        // Without limits of its own a slider in the page's document ends at 100.
+        // Without limits of its own, an HTML slider ends at 100.
         ui.ctx().accesskit_node_builder(response.id, |node| {
             let [least, most] = self.limits.map(|limit| limit as f64);
             node.set_min_numeric_value(least);
@@ -77,7 +77,7 @@ impl Corner {
             if wanted != side {
                 let in_run = state.setting("template", self.key).and_then(|value| value.as_u64());
                 let value = (in_run != Some(wanted)).then(|| json!(wanted));
-                out.push(Command::Why(Ask::Change { key: self.key.to_owned(), value }));
+                out.push(Command::Why(WhyCommand::Change { key: self.key.to_owned(), value }));
             }
         }
         response
@@ -99,13 +99,13 @@ fn point(ui: &mut Ui, canvas: &Canvas, at: Pixel, out: &mut Vec<Command>) {
         let tenth = |v: f64| (v * 10.0).round() / 10.0;
         let pixel = Pixel::new(tenth(to.x), tenth(to.y));
         if pixel != at {
-            out.push(Command::Why(Ask::Displace(Some(pixel))));
+            out.push(Command::Why(WhyCommand::Displace(Some(pixel))));
         }
     }
     response.on_hover_cursor(CursorIcon::Move).on_hover_text("Drag to try another prediction");
 }
 
-/// A handle, where it is on the canvas; it is painted while the pointer or the keyboard is there.
+/// Shows a handle if it is on the canvas; it is painted only while the pointer or the focus is on the image.
 fn handle(ui: &mut Ui, canvas: &Canvas, id: &str, at: Pixel, colour: Color32) -> Option<Response> {
     let place = canvas.transform.to_screen(at);
     if !canvas.transform.rect.contains(place) {
@@ -115,7 +115,7 @@ fn handle(ui: &mut Ui, canvas: &Canvas, id: &str, at: Pixel, colour: Color32) ->
     let response = ui.interact(area, ui.scope_id().with(("what if", id)), Sense::drag());
     let reach = if response.hovered() || response.dragged() { MARK + 2.0 } else { MARK };
     let mark = Rect::from_center_size(place, vec2(2.0 * reach, 2.0 * reach));
-    // Without pointer or keyboard on the image nothing covers it.
+    // Without pointer or focus on the image, nothing covers it.
     let is_near =
         ui.rect_contains_pointer(canvas.transform.rect) || response.dragged() || response.has_focus();
     if is_near {

@@ -1,16 +1,16 @@
-//! What if: the handles in the left image, the form in the panel “Why”, and the ghost of what came of it.
+//! What-if: the handles in the left image, the form in the panel “Why”, and the ghost of the result.
 
 mod card;
 mod form;
 mod handles;
 mod place;
-mod tried;
+mod values;
 pub(crate) mod scores;
 
 use sightline_track::trace::StepTrace;
 
 pub(crate) use self::form::form;
-use self::place::Place;
+use self::place::CardPlacement;
 
 use egui::Ui;
 
@@ -27,14 +27,14 @@ pub(crate) fn over_image(ui: &mut Ui, canvas: &Canvas, state: &State, out: &mut 
     if let Some(trial) = state.trial() {
         card::ghost(canvas, trial);
         match place::of(ui, state, &canvas.transform) {
-            Some(Place::Over(at)) => card::over(ui, canvas, at, state, out),
-            Some(Place::Strip(edge)) => card::strip(ui, canvas, edge, state, out),
+            Some(CardPlacement::Over(at)) => card::over(ui, canvas, at, state, out),
+            Some(CardPlacement::Strip(edge)) => card::strip(ui, canvas, edge, state, out),
             None => {}
         }
     }
 }
 
-/// Whether a step has a prediction that can be put elsewhere and settings that can be tried.
+/// Whether a step has a prediction that can be moved and settings that can be tried.
 pub(crate) fn can_be_tried(trace: &StepTrace) -> bool {
     trace.prediction().is_some() && trace.fault().is_none() && trace.why_not_searched().is_none()
 }

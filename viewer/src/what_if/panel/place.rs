@@ -1,6 +1,6 @@
-//! Where the card of a what-if lies: in the corner of the image with most room, never over the target or the search
-//! window; where no corner is free, as a flat strip along the edge that covers less. The image keeps its place and size,
-//! and while a handle is dragged the card keeps its own, so that nothing moves under the pointer.
+//! The position of the what-if card: the corner of the image with most room, never over the target or the search window. If
+//! no corner is free, a flat strip along the edge that covers less. The image keeps its position and size, and the card
+//! does not move while a handle is dragged.
 
 use egui::{Pos2, Rect, Ui, Vec2, pos2, vec2};
 use sightline_geometry::frames::Pixel;
@@ -10,19 +10,19 @@ use crate::drawing::view2d::Transform;
 use crate::state::State;
 use crate::what_if::Trial;
 
-/// Room that is left about what must not be covered, points.
+/// Margin around the areas that must not be covered, points.
 const ROOM: f32 = 14.0;
-/// Room between the card and the image's rim, points.
+/// Margin between the card and the edge of the image, points.
 const RIM: f32 = 8.0;
-/// How large the card is before it was painted, points.
+/// Assumed size of the card before it is first painted, points.
 const FIRST: Vec2 = vec2(230.0, 170.0);
-/// How high a strip is at least, points.
+/// Minimum height of a strip, points.
 pub(crate) const STRIP: f32 = 84.0;
 
-/// Where the card lies.
+/// The position of the card.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Place {
-    /// Over the image, with this corner of its upper left.
+pub(crate) enum CardPlacement {
+    /// Over the image, with the card's upper left corner here.
     Over(Pos2),
     /// A strip along the upper edge of the image, or along the lower one.
     Strip(Edge),
@@ -37,28 +37,28 @@ pub(crate) enum Edge {
     Bottom,
 }
 
-/// Where the card of the present trial lies over the image; none where nothing is tried.
-pub(crate) fn of(ui: &Ui, state: &State, transform: &Transform) -> Option<Place> {
+/// The position of the card of the current trial; `None` without a trial.
+pub(crate) fn of(ui: &Ui, state: &State, transform: &Transform) -> Option<CardPlacement> {
     let trial = state.trial()?;
     let trace = state.trace()?;
-    let known = ui.data(|data| data.get_temp::<Place>(id().with("place")));
+    let known = ui.data(|data| data.get_temp::<CardPlacement>(id().with("place")));
     if let Some(known) = known.filter(|_| ui.input(|input| input.pointer.any_down())) {
         return Some(known);
     }
-    let kept = kept_free(trial, trace, transform);
+    let to_avoid = areas_to_avoid(trial, trace, transform);
     let image = transform.rect;
-    let place = match corner(image.shrink(RIM), last_size(ui, FIRST), &kept) {
-        Some(at) => Place::Over(at),
-        None => Place::Strip(edge(image, &kept)),
+    let place = match corner(image.shrink(RIM), last_size(ui, FIRST), &to_avoid) {
+        Some(at) => CardPlacement::Over(at),
+        None => CardPlacement::Strip(edge(image, &to_avoid)),
     };
     ui.data_mut(|data| data.insert_temp(id().with("place"), place));
     Some(place)
 }
 
-/// The edge along which a strip covers less of what is kept free.
-fn edge(image: Rect, kept: &[Rect]) -> Edge {
+/// The edge along which a strip covers less of the areas to keep free.
+fn edge(image: Rect, to_avoid: &[Rect]) -> Edge {
     let covered = |strip: Rect| {
-        let shared = kept.iter().map(|kept| kept.intersect(strip)).filter(Rect::is_positive);
+        let shared = to_avoid.iter().map(|avoided| avoided.intersect(strip)).filter(Rect::is_positive);
         shared.map(|shared| shared.area()).sum::<f32>()
     };
     let above = covered(image.with_max_y(image.top() + STRIP));
@@ -66,8 +66,8 @@ fn edge(image: Rect, kept: &[Rect]) -> Edge {
     if above < below { Edge::Top } else { Edge::Bottom }
 }
 
-/// What the card must not cover, on the screen.
-fn kept_free(trial: &Trial, trace: &StepTrace, transform: &Transform) -> Vec<Rect> {
+/// The screen areas that the card must not cover.
+fn areas_to_avoid(trial: &Trial, trace: &StepTrace, transform: &Transform) -> Vec<Rect> {
     let ghost = trial.ghost.as_ref();
     let matched = trace.template().and_then(|e| e.match_template.as_ref());
     let windows = [matched.map(|m| m.search_window), ghost.and_then(|ghost| ghost.search_window)];
@@ -84,18 +84,18 @@ fn kept_free(trial: &Trial, trace: &StepTrace, transform: &Transform) -> Vec<Rec
         .collect()
 }
 
-/// The corner of `area` in which something of that size covers nothing of what is kept free: of several the one that is
-/// farthest from it. None where each covers something, or it does not fit at all.
-pub(crate) fn corner(area: Rect, size: Vec2, kept: &[Rect]) -> Option<Pos2> {
+/// The corner of `area` in which a card of this size covers no area to keep free; of several, the one farthest from these
+/// areas. `None` if the card covers one in every corner, or does not fit.
+pub(crate) fn corner(area: Rect, size: Vec2, to_avoid: &[Rect]) -> Option<Pos2> {
     if size.x > area.width() || size.y > area.height() {
         return None;
     }
     let (right, bottom) = (area.right() - size.x, area.bottom() - size.y);
-    // The first of equals is where the card has always been.
+    // Of equal corners the first is used, which is the default position of the card.
     let corners = [pos2(right, area.top()), area.min, pos2(right, bottom), pos2(area.left(), bottom)];
     let room = |at: Pos2| {
         let card = Rect::from_min_size(at, size);
-        kept.iter().map(|kept| card.signed_distance(*kept)).fold(f32::INFINITY, f32::min)
+        to_avoid.iter().map(|avoided| card.signed_distance(*avoided)).fold(f32::INFINITY, f32::min)
     };
     let mut best: Option<(f32, Pos2)> = None;
     for at in corners {
@@ -107,7 +107,7 @@ pub(crate) fn corner(area: Rect, size: Vec2, kept: &[Rect]) -> Option<Pos2> {
     best.map(|(_, at)| at)
 }
 
-/// How far two rectangles are from each other; negative where they share something.
+/// Signed distance between two rectangles; negative if they overlap.
 trait Apart {
     fn signed_distance(&self, other: Rect) -> f32;
 }
@@ -126,12 +126,12 @@ fn id() -> egui::Id {
     egui::Id::unique("size of the what-if card")
 }
 
-/// How large the card was when it was painted last.
+/// The size of the card when it was last painted.
 pub(crate) fn last_size(ui: &Ui, first: Vec2) -> Vec2 {
     ui.data(|data| data.get_temp(id())).unwrap_or(first)
 }
 
-/// Remembers it.
+/// Stores the size of the card.
 pub(crate) fn remember(ui: &Ui, size: Vec2) {
     let before = last_size(ui, FIRST);
     ui.data_mut(|data| data.insert_temp(id(), size));
@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn where_every_corner_covers_something_there_is_none() {
+    fn there_is_no_corner_if_each_covers_an_area_to_avoid() {
         let window = Rect::from_center_size(pos2(200.0, 150.0), vec2(380.0, 280.0));
         assert_eq!(corner(area(), vec2(150.0, 100.0), &[window]), None);
         assert_eq!(corner(area(), vec2(500.0, 20.0), &[]), None, "it does not fit at all");

@@ -1,5 +1,5 @@
-//! The scores of what is tried, beside those of the run or in their place: the same colours, the same pixels, a dashed
-//! frame, and in words what became of the peaks.
+//! The scores of the trial, beside those of the run or in their place: same colour map, same pixels, a dashed frame, and a
+//! description of the changed peaks.
 
 use egui::{Button, Label, Rect, Shape, Stroke, Ui, UiBuilder, vec2};
 use sightline_session::what_if::Ghost;
@@ -9,22 +9,22 @@ use sightline_track::settings::TrackerKind;
 
 use crate::command::{Command, Zoomable};
 use crate::drawing::overlay::paint_words;
-use crate::drawing::raster::{Look, Raster};
+use crate::drawing::raster::{ColourMap, Raster};
 use crate::drawing::view2d::Canvas;
 use crate::panels::score_marks::{Marked, paint_contour, paint_peaks, region_of};
 use crate::panels::status_line::STATUS;
 use crate::state::State;
 use crate::what_if::{Scores, Trial};
-use crate::why::Ask;
+use crate::why::WhyCommand;
 use crate::{panels, theme};
 
-/// Room between the two, points.
+/// Gap between the two score maps, points.
 const GAP: f32 = 4.0;
-/// The least width at which a surface can be read, points.
+/// Minimum width at which a score map is readable, points.
 const LEAST: f32 = 190.0;
 
-/// Shows the scores while a change is tried, beside those of the run, which `show_recorded` shows; false where no change
-/// is tried, or the tracker matches no template.
+/// Shows the scores of the trial beside those of the run, which `show_recorded` shows. `false` if there is no trial, or the
+/// tracker matches no template.
 pub(crate) fn show(
     ui: &mut Ui,
     state: &State,
@@ -37,7 +37,7 @@ pub(crate) fn show(
     let has_room = ui.available_width() >= 2.0 * LEAST + GAP;
     let chosen = state.why.scores_shown;
     let shown = if chosen == Scores::Both && !has_room { Scores::Tried } else { chosen };
-    let tried = state.tried_scores(ui.ctx());
+    let tried = state.trial_scores(ui.ctx());
     let recorded = state.trace().and_then(|trace| trace.template()).and_then(|e| e.match_template.as_ref());
     ui.horizontal(|ui| {
         ui.label(theme::note("scores"));
@@ -47,7 +47,7 @@ pub(crate) fn show(
             let button =
                 button.on_disabled_hover_text("The panel is too narrow for both: let it fill the page (`)");
             if button.accessible_name(format!("scores: {}", choice.words())).clicked() {
-                out.push(Command::Why(Ask::Scores(choice)));
+                out.push(Command::Why(WhyCommand::Scores(choice)));
             }
         }
     });
@@ -91,7 +91,7 @@ fn why_none(trial: &Trial) -> String {
     }
 }
 
-/// What became of the peaks.
+/// A comparison of the peaks.
 fn words(tried: &TemplateMatch, recorded: Option<&TemplateMatch>) -> String {
     let second = |matched: &TemplateMatch| {
         let peak = matched.second_peak.as_ref();
@@ -117,13 +117,13 @@ fn words(tried: &TemplateMatch, recorded: Option<&TemplateMatch>) -> String {
 
 fn show_tried(ui: &mut Ui, state: &State, ghost: &Ghost, raster: &Raster, out: &mut Vec<Command>) {
     let Some(matched) = &ghost.matched else { return };
-    raster.look(Look::Values(matched.measure.shown_limits()));
+    raster.set_colour_map(ColourMap::Values(matched.measure.shown_limits()));
     let region = region_of(matched.search_window, raster.size());
-    let canvas = Canvas::new(ui, state.view(Zoomable::Surface), region, STATUS);
+    let canvas = Canvas::new(ui, state.view(Zoomable::ScoreMap), region, STATUS);
     canvas.checker(region);
     canvas.texture(&raster.texture, region);
     if state.marks {
-        let threshold = state.tried_setting("limits", "ncc_min").and_then(|value| value.as_f64());
+        let threshold = state.trial_setting("limits", "ncc_min").and_then(|value| value.as_f64());
         if let Some(threshold) = threshold.filter(|_| matched.measure == Measure::Ncc) {
             paint_contour(&canvas, raster, region, threshold as f32);
         }
@@ -142,6 +142,6 @@ fn show_tried(ui: &mut Ui, state: &State, ghost: &Ghost, raster: &Raster, out: &
     let line = format!("what if, {} positions; colours {least:+} to {greatest:+}", matched.positions);
     ui.add(Label::new(theme::note(line)).truncate());
     if let Some(view) = canvas.moved {
-        out.push(Command::View(Zoomable::Surface, view));
+        out.push(Command::View(Zoomable::ScoreMap, view));
     }
 }

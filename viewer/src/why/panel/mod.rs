@@ -1,7 +1,7 @@
-//! Why: a card with the root cause and its evidence, where any number came from, what would have saved the step, and the gates
-//! by margin with limits that can be dragged.
+//! The panel “Why”: a card with the root cause and its evidence, the origin of any number, the counterfactuals of the step,
+//! and the gates by margin with limits that can be dragged.
 
-mod criteria;
+mod gates;
 mod saved;
 mod tree;
 mod view;
@@ -15,7 +15,7 @@ use crate::panels::panel::Panel;
 use crate::state::State;
 use crate::theme;
 use crate::what_if::panel;
-use crate::why::{Ask, Part};
+use crate::why::{WhyCommand, WhySection};
 
 /// The panel “Why”.
 pub(crate) struct Why;
@@ -38,27 +38,27 @@ impl Panel for Why {
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let step = state.cursor.step;
     let Some(poses) = state.poses() else { return };
-    let Some(book) = state.book(&poses) else { return };
-    let trace = book.trace;
-    // Another run or target is shown from its headline on.
+    let Some(context) = state.step_context(&poses) else { return };
+    let trace = context.trace;
+    // The scroll position restarts at the headline for another run or target.
     let of = state.step_key(step).map(|key| (key.session, key.target, key.run));
     ScrollArea::vertical().id_salt(("why", of)).auto_shrink(false).show(ui, |ui| {
         crate::driving::why::show_here(ui, state, out);
         let top = ui.cursor().top();
-        card(ui, state, &book.summary());
-        view::bring(ui, state.why.in_view, Part::Card, top, true);
+        card(ui, state, &context.summary());
+        view::scroll_to(ui, state.why.scroll_request, WhySection::Card, top, true);
         ui.horizontal_wrapped(|ui| {
             let explain =
                 ui.button("Why this state?").on_hover_text("Where the tracking state of this step came from");
             if explain.clicked() {
-                out.push(Command::Why(Ask::Value { step, value: "state".to_owned() }));
+                out.push(Command::Why(WhyCommand::Value { step, value: "state".to_owned() }));
             }
             saved::button(ui, state, out);
         });
         tree::show(ui, state, out);
         saved::show(ui, state, out);
         if let Some(verdict) = trace.verdict() {
-            section(ui, "gates, worst margin first", |ui| criteria::show(ui, state, verdict, out));
+            section(ui, "gates, worst margin first", |ui| gates::show(ui, state, verdict, out));
         }
         if panel::can_be_tried(trace) {
             section(ui, "what if, for this step", |ui| panel::form(ui, state, trace, out));
@@ -66,7 +66,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     });
 }
 
-/// The headline with its bullets, in a frame of the colour of the tracking state.
+/// Shows the headline with its bullets, in a frame of the tracking state's colour.
 fn card(ui: &mut Ui, state: &State, summary: &Summary) {
     let colour = match state.row() {
         Some(row) if row.not_searched => theme::weak(),
@@ -93,8 +93,8 @@ fn card(ui: &mut Ui, state: &State, summary: &Summary) {
     });
 }
 
-/// A part of the panel under its title. Its controls stay the same ones when something comes in above them: a slider that is
-/// held is not let go because a value was explained.
+/// Shows a part of the panel below its title. Its controls keep their ids when content is inserted above them, so that a
+/// drag of a slider continues.
 fn section(ui: &mut Ui, title: &str, show: impl FnOnce(&mut Ui)) {
     ui.scope_builder(UiBuilder::new().scope_id(Id::unique(("why", title))), |ui| {
         CollapsingHeader::new(theme::title(title)).id_salt(title).default_open(true).show(ui, show);

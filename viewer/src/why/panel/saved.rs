@@ -1,4 +1,4 @@
-//! What would have saved the step: the question, how far it is, and the findings with what can be done with each.
+//! The counterfactuals of a step: the search, its progress, and the findings with their actions.
 
 use egui::{Button, CollapsingHeader, Color32, Frame, Label, Margin, ProgressBar, RichText, Ui, vec2};
 use sightline_session::counterfactual::wire::{Question, QuestionState};
@@ -12,9 +12,9 @@ use crate::command::Command;
 use crate::state::{State, run_letter};
 use crate::theme;
 use crate::why::panel::view;
-use crate::why::{Ask, Part, Told};
+use crate::why::{Remote, WhyCommand, WhySection};
 
-/// The button that asks.
+/// The button that starts the search.
 pub(crate) fn button(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let row = state.row();
     let is_worth =
@@ -24,31 +24,31 @@ pub(crate) fn button(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let why_not = "This step was accepted, and nothing says that it is wrong: there is nothing to save.";
     let button = ui.add_enabled(is_worth, Button::new("What would have saved it?").min_size(vec2(0.0, 24.0)));
     if button.on_hover_text(help).on_disabled_hover_text(why_not).clicked() {
-        out.push(Command::Why(Ask::Saved));
+        out.push(Command::Why(WhyCommand::Saved));
     }
 }
 
-/// The findings so far.
+/// Shows the findings so far.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let top = ui.cursor().top();
     match state.question() {
         None => {}
-        Some(Told::Waiting) => {
+        Some(Remote::Pending) => {
             ui.label(theme::note("Asking …"));
         }
-        Some(Told::Refused(why)) => {
+        Some(Remote::Refused(why)) => {
             ui.add(Label::new(RichText::new(why).color(theme::lost())).wrap());
         }
-        Some(Told::Here(question)) => show_question(ui, state, question, out),
+        Some(Remote::Received(question)) => show_question(ui, state, question, out),
     }
     let is_here = match state.question() {
-        Some(Told::Here(question)) => {
+        Some(Remote::Received(question)) => {
             let is_searching = matches!(question.state, QuestionState::Waiting | QuestionState::Running);
             !is_searching || question.answer.as_ref().is_some_and(|answer| !answer.findings.is_empty())
         }
-        told => !matches!(told, Some(Told::Waiting)),
+        remote => !matches!(remote, Some(Remote::Pending)),
     };
-    view::bring(ui, state.why.in_view, Part::Saved, top, is_here);
+    view::scroll_to(ui, state.why.scroll_request, WhySection::Saved, top, is_here);
 }
 
 fn show_question(ui: &mut Ui, state: &State, question: &Question, out: &mut Vec<Command>) {
@@ -90,7 +90,7 @@ fn progress(ui: &mut Ui, question: &Question, out: &mut Vec<Command>) {
         QuestionState::Waiting | QuestionState::Running => {
             ui.horizontal(|ui| {
                 if ui.button("Cancel search").clicked() {
-                    out.push(Command::Why(Ask::CancelSaved));
+                    out.push(Command::Why(WhyCommand::CancelSaved));
                 }
                 let words = if n == 0 {
                     "waiting for its turn".to_owned()
@@ -115,7 +115,7 @@ fn progress(ui: &mut Ui, question: &Question, out: &mut Vec<Command>) {
     }
 }
 
-/// The outcome of a finding in a word, with the colour of the state.
+/// The outcome of a finding as a word, in the colour of the state.
 fn outcome(finding: &Finding) -> (&'static str, Color32) {
     match finding.outcome {
         Outcome::Right => ("Correct", theme::tracking()),
@@ -125,7 +125,7 @@ fn outcome(finding: &Finding) -> (&'static str, Color32) {
     }
 }
 
-/// A finding as a row: outcome, change, effect, and what can be done with it.
+/// Shows a finding as a row: outcome, change, effect, and actions.
 fn show_finding(ui: &mut Ui, state: &State, number: usize, finding: &Finding, out: &mut Vec<Command>) {
     let (word, colour) = outcome(finding);
     let frame = Frame::new().fill(theme::well()).corner_radius(3).inner_margin(Margin::symmetric(6, 3));
@@ -164,7 +164,7 @@ fn changes(finding: &Finding) -> String {
     settings.chain(moved).collect::<Vec<_>>().join(", ")
 }
 
-/// The effect of a finding: its distance from the truth, and the margin of the gate that failed.
+/// The effect of a finding: its distance from the ground truth, and the margin of the failed gate.
 fn effect(finding: &Finding) -> String {
     let error = finding.row.err_px.map(|px| format!("{} px from the truth", number(px)));
     let margin = finding.gate.as_ref().zip(finding.margin_after).map(|(gate, margin)| {
@@ -190,11 +190,11 @@ fn attempt(
     let tried = state.trial().is_some_and(|trial| trial.what_if == *what_if);
     let button = ui.add(Button::new(words).selected(tried).min_size(vec2(40.0, 24.0)));
     if button.accessible_name(name).on_hover_text("Shows it as a ghost at this step").clicked() {
-        out.push(Command::Why(Ask::Try(what_if.clone())));
+        out.push(Command::Why(WhyCommand::Try(what_if.clone())));
     }
 }
 
-/// The button that branches with a change, or how long that branch stayed tracked.
+/// The button that forks the run with a change; after that, how long the branch stayed tracked.
 fn run(ui: &mut Ui, state: &State, number: usize, what_if: &WhatIf, out: &mut Vec<Command>) {
     if let Some(branch) = state.branch_of(what_if) {
         branch_words(ui, state, branch, out);
@@ -204,11 +204,11 @@ fn run(ui: &mut Ui, state: &State, number: usize, what_if: &WhatIf, out: &mut Ve
     let help = "Runs on from this step with the change, as a branch, to see how long it stays tracked";
     let name = format!("run from here with finding {}", number + 1);
     if run.accessible_name(name).on_hover_text(help).clicked() {
-        out.push(Command::Why(Ask::BranchWith(what_if.clone())));
+        out.push(Command::Why(WhyCommand::BranchWith(what_if.clone())));
     }
 }
 
-/// How long a branch stayed tracked.
+/// Shows how long a branch stayed tracked.
 fn branch_words(ui: &mut Ui, state: &State, branch: &RunView, out: &mut Vec<Command>) {
     let step = state.cursor.step;
     let later = || branch.rows.iter().filter(|row| row.step > step);
@@ -219,6 +219,6 @@ fn branch_words(ui: &mut Ui, state: &State, branch: &RunView, out: &mut Vec<Comm
         later().count()
     );
     if ui.link(words).clicked() {
-        out.extend(state.cursor.target.map(|target| Command::Look { target, run: branch.number }));
+        out.extend(state.cursor.target.map(|target| Command::SelectRun { target, run: branch.number }));
     }
 }

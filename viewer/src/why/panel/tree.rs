@@ -1,4 +1,4 @@
-//! Where a value came from, as a tree: each line can be asked about in turn.
+//! The origin of a value as a tree; a click on a line explains that value.
 
 use egui::collapsing_header::CollapsingState;
 use egui::{Id, Label, RichText, Ui};
@@ -9,47 +9,47 @@ use crate::command::{Command, Go};
 use crate::state::State;
 use crate::theme;
 use crate::why::panel::view;
-use crate::why::{Ask, Part, Told};
+use crate::why::{Remote, WhyCommand, WhySection};
 
-/// How many levels are open at first.
+/// Number of levels that are initially open.
 const OPEN: usize = 2;
 
-/// Shows the tree of the value that was asked for last.
+/// Shows the tree of the value that was requested last.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
-    let Some((key, value, told)) = state.explained() else {
+    let Some((key, value, remote)) = state.explained() else {
         return;
     };
     ui.add_space(2.0);
     let top = ui.cursor().top();
     ui.horizontal_wrapped(|ui| {
         ui.label(theme::title(&format!("why {value}, {}", state.whose(key))));
-        if state.why.asked.len() > 1
+        if state.why.history.len() > 1
             && ui.button("Back").on_hover_text("The value asked for before").clicked()
         {
-            out.push(Command::Why(Ask::Back));
+            out.push(Command::Why(WhyCommand::Back));
         }
         let is_here = state.step_key(state.cursor.step).as_ref() == Some(key);
         if !is_here && ui.button("At this step").clicked() {
-            out.push(Command::Why(Ask::Value { step: state.cursor.step, value: value.to_owned() }));
+            out.push(Command::Why(WhyCommand::Value { step: state.cursor.step, value: value.to_owned() }));
         }
     });
-    match told {
-        Told::Waiting => {
+    match remote {
+        Remote::Pending => {
             ui.label(theme::note("Asking …"));
         }
-        Told::Refused(why) => {
+        Remote::Refused(why) => {
             ui.add(Label::new(RichText::new(why).color(theme::lost())).wrap());
         }
-        Told::Here(explanation) => {
+        Remote::Received(explanation) => {
             if let Some(tree) = &explanation.tree {
                 branch(ui, tree, ui.scope_id().with(("why", value, key.step)), 0, out);
             }
         }
     }
-    view::bring(ui, state.why.in_view, Part::Tree, top, !matches!(told, Told::Waiting));
+    view::scroll_to(ui, state.why.scroll_request, WhySection::Tree, top, !matches!(remote, Remote::Pending));
 }
 
-/// One value with what it was made of.
+/// Shows a value with its inputs.
 fn branch(ui: &mut Ui, node: &Node, id: Id, depth: usize, out: &mut Vec<Command>) {
     let is_leaf = node.inputs.is_empty() && node.formula.is_none() && node.origin.is_none();
     if is_leaf {
@@ -79,7 +79,7 @@ fn branch(ui: &mut Ui, node: &Node, id: Id, depth: usize, out: &mut Vec<Command>
         });
 }
 
-/// Name, value, unit and stage; a click asks about it.
+/// Shows name, value, unit and stage; a click on the name explains it.
 fn line(ui: &mut Ui, node: &Node, out: &mut Vec<Command>) {
     let value = words(node);
     ui.horizontal_wrapped(|ui| {
@@ -87,7 +87,7 @@ fn line(ui: &mut Ui, node: &Node, out: &mut Vec<Command>) {
         let link =
             ui.link(RichText::new(&node.label).size(12.0)).on_hover_text(format!("Why {}?", node.value));
         if link.clicked() {
-            out.push(Command::Why(Ask::Value { step: node.step, value: node.value.clone() }));
+            out.push(Command::Why(WhyCommand::Value { step: node.step, value: node.value.clone() }));
         }
         link.context_menu(|ui| {
             if ui.button("Copy value").clicked() {
@@ -124,7 +124,7 @@ fn from(ui: &mut Ui, origin: &Origin, out: &mut Vec<Command>) {
     });
 }
 
-/// The numbers of a value, or its word.
+/// The numbers of a value, or its text.
 fn words(node: &Node) -> String {
     if let (Some(text), true) = (&node.text, node.numbers.is_empty()) {
         return text.clone();

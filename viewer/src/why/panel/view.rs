@@ -1,20 +1,20 @@
-//! Scrolls the part of the panel that was asked for to the panel's upper edge: an answer below the fold would be missed.
+//! Scrolls the requested part of the panel to the top of the panel, so that an answer below the fold is not missed.
 
 use egui::style::ScrollAnimation;
 use egui::{Align, Id, Ui};
 
-use crate::why::{InView, Part};
+use crate::why::{ScrollRequest, WhySection};
 
-/// Scrolls to `part`, which begins at `top`, until what it shows is here, if it is the one that was asked for last.
-pub(super) fn bring(ui: &Ui, asked: InView, part: Part, top: f32, is_here: bool) {
+/// If `part` was requested last, scrolls to its top at `top` in each frame until its content has arrived (`is_here`).
+pub(super) fn scroll_to(ui: &Ui, request: ScrollRequest, part: WhySection, top: f32, is_here: bool) {
     let id = Id::unique("why asked for");
-    let is_done = asked.count == 0 || ui.data(|data| data.get_temp(id)) == Some(asked.count);
-    if is_done || asked.part != part {
+    let is_done = request.count == 0 || ui.data(|data| data.get_temp(id)) == Some(request.count);
+    if is_done || request.part != part {
         return;
     }
     let rect = ui.max_rect().with_min_y(top).with_max_y(ui.cursor().top());
     ui.scroll_to_rect_animation(rect, Some(Align::TOP), ScrollAnimation::none());
     if is_here {
-        ui.data_mut(|data| data.insert_temp(id, asked.count));
+        ui.data_mut(|data| data.insert_temp(id, request.count));
     }
 }

@@ -1,27 +1,27 @@
-//! What is wanted of a figure: of which panel, and as what.
+//! A request for a figure: the panel and the file type.
 
 use crate::panels::pane::Pane;
 
-/// What a figure is saved as.
+/// The file type of a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// Vectors.
+pub enum FigureFormat {
+    /// Vector graphics.
     Svg,
-    /// Pixels: so many of them a point.
+    /// PNG at this number of pixels per point.
     Png(u8),
 }
 
-impl Default for Kind {
+impl Default for FigureFormat {
     fn default() -> Self {
         Self::Png(2)
     }
 }
 
-impl Kind {
-    /// All of them.
+impl FigureFormat {
+    /// All file types.
     pub const ALL: [Self; 5] = [Self::Svg, Self::Png(1), Self::Png(2), Self::Png(3), Self::Png(4)];
 
-    /// What it is called.
+    /// The name in menus.
     pub fn word(self) -> String {
         match self {
             Self::Svg => "SVG".to_owned(),
@@ -30,26 +30,26 @@ impl Kind {
     }
 }
 
-/// Ground and width of a figure.
+/// Background and width of a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sheet {
+pub enum FigurePage {
     /// As the panel is on the screen.
     Screen,
     /// For a paper: white, without controls, this many points wide.
     Paper(u16),
 }
 
-impl Default for Sheet {
+impl Default for FigurePage {
     fn default() -> Self {
         Self::Paper(720)
     }
 }
 
-impl Sheet {
+impl FigurePage {
     /// All choices.
     pub const ALL: [Self; 4] = [Self::Paper(360), Self::Paper(720), Self::Paper(1080), Self::Screen];
 
-    /// The words of its button.
+    /// The label of its button.
     pub fn words(self) -> String {
         match self {
             Self::Screen => "as on the screen".to_owned(),
@@ -58,11 +58,11 @@ impl Sheet {
     }
 }
 
-/// A figure that is wanted.
+/// A request for a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Wish {
-    /// Of which panel.
+pub struct FigureRequest {
+    /// The panel.
     pub pane: Pane,
-    /// As what.
-    pub kind: Kind,
+    /// The file type.
+    pub kind: FigureFormat,
 }

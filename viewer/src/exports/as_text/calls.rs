@@ -1,5 +1,5 @@
-//! The calls behind what the page shows, for anybody to repeat: explanation of a number, trial, counterfactual, comparison,
-//! metrics, breakpoints, columns, trackability, studies, live stream.
+//! The calls behind the current view, which the user can repeat: explanation, trial, counterfactual, comparison, metrics,
+//! breakpoints, columns, trackability, studies, live stream.
 
 use sightline_api::endpoint::Call;
 use sightline_api::endpoints::{
@@ -17,7 +17,7 @@ use crate::state::State;
 use crate::studies::update::start_study;
 use crate::trackability::update::map_call;
 
-/// The calls about what is shown at the cursor, each with its words.
+/// The calls about the current view, each with its description.
 pub(crate) fn calls(state: &State, session: &str) -> Vec<(String, Call)> {
     let mut calls = of_step(state);
     calls.extend(of_runs(state, session));
@@ -27,7 +27,7 @@ pub(crate) fn calls(state: &State, session: &str) -> Vec<(String, Call)> {
         let call = map_call::<ShowTrackability>(&(traverse.id.clone(), step, limits));
         calls.push((format!("map of trackability at step {step}"), call));
     }
-    if let Some(new) = state.studies.chosen().and_then(|info| state.studies.order.request(info).ok()) {
+    if let Some(new) = state.studies.chosen().and_then(|info| state.studies.form.request(info).ok()) {
         calls.push((format!("start the study {}", new.study), start_study(&new)));
     }
     if state.target().is_some() {
@@ -36,7 +36,7 @@ pub(crate) fn calls(state: &State, session: &str) -> Vec<(String, Call)> {
     calls
 }
 
-/// About the step at the cursor.
+/// The calls about the cursor's step.
 fn of_step(state: &State) -> Vec<(String, Call)> {
     let Some(at) = state.step_key(state.cursor.step).filter(|_| state.row().is_some()) else {
         return Vec::new();
@@ -56,7 +56,7 @@ fn of_step(state: &State) -> Vec<(String, Call)> {
     calls
 }
 
-/// About the run at the cursor and those compared with it.
+/// The calls about the selected run and the compared ones.
 fn of_runs(state: &State, session: &str) -> Vec<(String, Call)> {
     let session = session.to_owned();
     let mut calls = Vec::new();
@@ -74,14 +74,14 @@ fn of_runs(state: &State, session: &str) -> Vec<(String, Call)> {
     calls
 }
 
-/// Breakpoints and plotted expressions.
+/// The calls for breakpoints and plotted expressions.
 fn of_expressions(state: &State, session: &str) -> Vec<(String, Call)> {
     let at = AtSession { session: session.to_owned() };
-    let breakpoints = state.ask.breakpoints.iter().map(|known| {
+    let breakpoints = state.breakpoints.list.iter().map(|known| {
         let new = NewBreakpoint { expression: Some(known.expression.clone()), step: None };
         (format!("break when {}", known.expression), Call::with_body::<AddBreakpoint>(&at, &new))
     });
-    let columns = state.ask.derived.iter().map(|derived| {
+    let columns = state.breakpoints.derived.iter().map(|derived| {
         let query =
             Query { expression: derived.expression.clone(), target: state.cursor.target, values: true };
         (format!("column {}", derived.expression), Call::with_body::<QuerySession>(&at, &query))
@@ -94,13 +94,15 @@ mod tests {
     use crate::command::Command;
     use crate::exports::as_text::actions;
     use crate::tests::fixture;
-    use crate::why::Ask;
+    use crate::why::WhyCommand;
 
     #[test]
-    fn whatever_is_asked_can_be_repeated_over_http() {
+    fn every_request_has_an_http_equivalent() {
         let mut state = fixture::at_step(&egui::Context::default(), 3);
-        state.perform(Command::Why(Ask::Value { step: 3, value: "ncc".to_owned() }));
-        state.perform(Command::Ask(crate::breakpoints::Ask::Plot("stereo_score - ncc".to_owned())));
+        state.perform(Command::Why(WhyCommand::Value { step: 3, value: "ncc".to_owned() }));
+        state.perform(Command::Breakpoints(crate::breakpoints::BreakpointCommand::Plot(
+            "stereo_score - ncc".to_owned(),
+        )));
         let all = actions(&state);
         let http = |words: &str| {
             let found = all.iter().find(|action| action.words == words);

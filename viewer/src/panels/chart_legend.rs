@@ -1,4 +1,4 @@
-//! The row above a chart that names its lines, each with its shape: it covers nothing of the chart.
+//! The row above a chart that names its lines, each with its shape, so that nothing covers the chart.
 
 use egui::text::{LayoutJob, TextWrapping};
 use egui::{Color32, Painter, Pos2, Rect, Sense, Shape, Stroke, Ui, Vec2, vec2};
@@ -9,13 +9,13 @@ use crate::theme;
 /// Height of the row, points.
 pub(crate) const HEIGHT: f32 = 15.0;
 
-/// A name is left out of a row that has less room for its word, points.
+/// A row with less space for a word than this omits the name, points.
 const WORD_MIN: f32 = 24.0;
 
 /// Paints a mark beside its name: centre, mark, colour, and half its size in points.
 type PaintMark = fn(&Painter, Pos2, Mark, Color32, f32);
 
-/// Shows the title and the names of plotted lines in one row. Their marks are filled, as the plotted points are.
+/// Shows the title and the names of plotted lines in one row. Their marks are filled, like the plotted points.
 pub(crate) fn show(ui: &mut Ui, title: &str, names: &[(Mark, Color32, String)]) {
     ui.horizontal(|ui| {
         ui.set_height(HEIGHT);
@@ -23,7 +23,7 @@ pub(crate) fn show(ui: &mut Ui, title: &str, names: &[(Mark, Color32, String)]) 
     });
 }
 
-/// Shows the title and the names in as many rows as they need.
+/// Shows the title and the names in as many rows as needed.
 pub(crate) fn wrapped(ui: &mut Ui, title: &str, names: &[(Mark, Color32, String)]) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.y = 1.0;
@@ -42,8 +42,8 @@ fn contents(ui: &mut Ui, title: &str, names: &[(Mark, Color32, String)], paint: 
     }
 }
 
-/// A mark with its word, which stay together where the row is broken. A word that is longer than the row is elided: the row
-/// must not widen its panel.
+/// A mark with its word, which stay together at a line break. A word longer than the row is elided, so that the row does
+/// not widen its panel.
 fn entry(ui: &mut Ui, (mark, colour, paint): (Mark, Color32, PaintMark), name: &str) {
     let reach = if matches!(mark, Mark::Stroke(_)) { 8.0 } else { 4.0 };
     let beside = 2.0 * reach + 6.0;
@@ -67,7 +67,7 @@ fn entry(ui: &mut Ui, (mark, colour, paint): (Mark, Color32, PaintMark), name: &
     }
 }
 
-/// A mark as plots draw their points: closed shapes are filled.
+/// A mark in the style of plotted points: closed shapes are filled.
 fn paint_filled(painter: &Painter, at: Pos2, mark: Mark, colour: Color32, reach: f32) {
     let polygon = |corners: &[[f32; 2]]| {
         let corners = corners.iter().map(|&[x, y]| at + vec2(x, y) * reach).collect();

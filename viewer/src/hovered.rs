@@ -1,27 +1,27 @@
-//! What the pointer rests on, as a place of the drive and not of a panel: every panel shows the same place in its own way.
+//! The hovered location, as a location of the drive: every panel marks the same location in its own way.
 //!
-//! A panel tells it with `Command::Point` in every frame in which the pointer is over it; the page takes the last one in,
-//! and all panels show it in the next frame. It is no part of what is looked at: links and undo know nothing of it.
+//! The panel under the pointer sends `Command::Hover` in every frame; the page keeps the last one, and all panels mark it
+//! in the next frame. The hovered location is part of neither links nor undo.
 //!
-//! | told by | left image | right image | scores | strip | profile | map | timeline, plots |
+//! | hovered in | left image | right image | scores | strip | profile | map | timeline, plots |
 //! |---|---|---|---|---|---|---|---|
-//! | `Left` (left image) | | its curve | the place | what is there | | its line of sight | |
-//! | `Right` (right image) | its curve | | | | the range | | |
-//! | `Score` (scores) | the window | its curve | | what is there | | its line of sight | |
-//! | `Range` (profile) | | the place | | | | | |
+//! | `Left` (left image) | | its epipolar curve | the position | the values there | | its line of sight | |
+//! | `Right` (right image) | its epipolar curve | | | | the range | | |
+//! | `Score` (scores) | the window | its epipolar curve | | the values there | | its line of sight | |
+//! | `Range` (profile) | | the position | | | | | |
 //! | `Step` (timeline, plots, map) | | | | | | the stop | the step |
 
 use sightline_geometry::frames::Pixel;
 use sightline_vision::image::PixelRect;
 
-/// What the pointer rests on.
+/// The hovered location.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Pointed {
+pub enum Hovered {
     /// A pixel of the left image.
     Left(Pixel),
     /// A pixel of the right image.
     Right(Pixel),
-    /// A position of the template: the pixel of the left image at its centre.
+    /// A template position: the pixel of the left image at the centre of the template.
     Score(Pixel),
     /// A range along the line of sight of the target, m.
     Range(f64),
@@ -29,8 +29,8 @@ pub enum Pointed {
     Step(usize),
 }
 
-impl Pointed {
-    /// The pixel of the left image, where it is about one.
+impl Hovered {
+    /// The pixel of the left image; `None` for the other variants.
     pub fn left(self) -> Option<Pixel> {
         match self {
             Self::Left(pixel) | Self::Score(pixel) => Some(pixel),
@@ -39,7 +39,7 @@ impl Pointed {
     }
 }
 
-/// The side × side pixels about the pixel nearest to `centre`; none where they leave an image of this size.
+/// The `side` × `side` window about the pixel nearest to `centre`; `None` if it exceeds an image of this width and height.
 pub(crate) fn window(centre: Pixel, side: u32, [width, height]: [u32; 2]) -> Option<PixelRect> {
     let half = (side / 2) as i32;
     let (x, y) = (centre.x.round() as i32 - half, centre.y.round() as i32 - half);

@@ -1,11 +1,11 @@
-//! Why there is nothing to show, as sentences that say how to get it.
+//! Sentences that explain why a panel is empty and what to do about it.
 
 use crate::cache::Slot;
 use crate::state::State;
 use sightline_session::driving::DriveView;
 
 impl State {
-    /// Why the panels of a step have nothing to show, as a sentence that says how to get it.
+    /// Why the panels of a step are empty, and what to do.
     pub(crate) fn missing_step(&self) -> String {
         let Some(target) = self.target() else { return self.missing_target() };
         let step = self.cursor.step;
@@ -52,7 +52,7 @@ impl State {
         }
     }
 
-    /// Where to go from a step that has nothing to show, as a sentence; empty at the last stop.
+    /// Where to go from an empty step; empty at the last stop.
     pub(crate) fn next_step_words(&self, purpose: &str) -> String {
         if self.cursor.step + 1 < self.stop_count() {
             return format!(" Press → {purpose}.");
@@ -65,7 +65,7 @@ impl State {
         }
     }
 
-    /// Why there is no target, as a sentence that says how to get one.
+    /// Why there is no target, and how to get one.
     pub(crate) fn missing_target(&self) -> String {
         match (&self.traverse, &self.traverses) {
             (None, None) => "Asking the server for its traverses …".to_owned(),

@@ -1,6 +1,6 @@
-//! The last place of the strip: what would be compared where the pointer rests, in the scores or in the left image.
+//! The last patch of the strip: the window at the pointer, which may be in the score map, the left image or another panel.
 //!
-//! It is the left image's own pixels about the nearest whole pixel, where the match has them between pixels.
+//! It consists of whole pixels of the left image about the nearest pixel; the match interpolates between pixels.
 
 use std::sync::Arc;
 
@@ -10,22 +10,22 @@ use sightline_track::locate::template::match_template::TemplateMatch;
 use sightline_track::trace::{ArrayName, StepTrace};
 use sightline_vision::image::PixelRect;
 
-use crate::cache::Eye;
+use crate::cache::ImageSide;
 use crate::drawing::overlay::{Mark, paint_mark};
 use crate::drawing::raster::Raster;
+use crate::hovered::window;
 use crate::panels::score_marks::region_of;
 use crate::panels::strip::patch::{paint_patch, paint_title};
-use crate::pointed::window;
 use crate::state::State;
 use crate::theme;
 
-/// What the place is called.
+/// The title of the patch.
 pub(crate) const TITLE: &str = "at the pointer";
 
-/// From this width on an empty place has room for words, points.
+/// Minimum width for text in an empty patch, points.
 const WORDS_FROM: f32 = 100.0;
 
-/// Whether the step compared windows, so that there is something to point at.
+/// Whether the step compared windows, so that a pointed window is meaningful.
 pub(crate) fn is_there(trace: &StepTrace) -> bool {
     matched(trace).is_some()
 }
@@ -35,16 +35,16 @@ fn matched(trace: &StepTrace) -> Option<&TemplateMatch> {
     matched.descent.is_none().then_some(matched)
 }
 
-/// The score of the place that is pointed at, in words: above the arrow.
+/// The score at the pointed pixel in words, shown above the arrow.
 pub(crate) fn score(state: &State) -> String {
-    let found = state.pointed_left().and_then(|pixel| score_at(state, pixel));
+    let found = state.hovered_left().and_then(|pixel| score_at(state, pixel));
     found.map_or_else(String::new, |(word, value)| match value {
         Some(value) => format!("{word} {value:.2}"),
         None => "excluded".to_owned(),
     })
 }
 
-/// The measure and its value at the nearest position; none outside of the searched ones.
+/// The measure and its value at the nearest position; `None` outside the searched positions.
 fn score_at(state: &State, pixel: Pixel) -> Option<(&'static str, Option<f32>)> {
     let matched = matched(state.trace()?)?;
     let raster = state.array(ArrayName::SURFACE).ready()?;
@@ -55,10 +55,10 @@ fn score_at(state: &State, pixel: Pixel) -> Option<(&'static str, Option<f32>)> 
         .then(|| (matched.measure.word(), raster.at(at(pixel.x, region.x), at(pixel.y, region.y))))
 }
 
-/// Shows the place.
+/// Shows the patch.
 pub(crate) fn show(ui: &mut Ui, state: &State, frame: Rect) {
     paint_title(ui, frame, TITLE);
-    let words = match state.pointed_left().map(|pixel| cut(ui, state, pixel, Cut::Pointed)) {
+    let words = match state.hovered_left().map(|pixel| cut(ui, state, pixel, Cut::Hovered)) {
         Some(Some(raster)) => {
             paint_patch(ui, &raster, frame);
             let score = score(state);
@@ -77,7 +77,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, frame: Rect) {
     ));
 }
 
-/// The place without a patch, and what is missing.
+/// An empty patch with the reason in `words`.
 fn empty(ui: &Ui, frame: Rect, words: &str) -> String {
     let painter = ui.painter();
     painter.rect_filled(frame, 0.0, theme::well());
@@ -91,18 +91,18 @@ fn empty(ui: &Ui, frame: Rect, words: &str) -> String {
     format!("{TITLE}: {words}")
 }
 
-/// Which patch is cut from the left image.
+/// The patches that are cut from the left image.
 #[derive(Clone, Copy, Debug, Hash)]
 pub(super) enum Cut {
-    /// The one about the pointer.
-    Pointed,
+    /// The patch about the pointer.
+    Hovered,
     /// The template of the designation.
     Template,
 }
 
-/// The patch about a pixel, made once for as long as the pixel stays; `None` where it would leave the image.
+/// The patch about a pixel, cached while the pixel does not change; `None` if it would leave the image.
 pub(super) fn cut(ui: &Ui, state: &State, pixel: Pixel, which: Cut) -> Option<Arc<Raster>> {
-    let image = state.image(Eye::Left).ready()?;
+    let image = state.image(ImageSide::Left).ready()?;
     let side = match state.array(ArrayName::ROLLED).ready() {
         Some(rolled) => rolled.size()[0],
         None => state.template_side_px(),
@@ -110,15 +110,15 @@ pub(super) fn cut(ui: &Ui, state: &State, pixel: Pixel, which: Cut) -> Option<Ar
     let area = window(pixel, side, image.size())?;
     let of = (state.traverse.as_ref()?.id.clone(), state.cursor.step, area);
     let id = Id::unique(("a patch of the left image", which));
-    let kept = ui.data(|data| data.get_temp::<Kept>(id)).filter(|kept| kept.of == of);
-    let kept = kept.unwrap_or_else(|| Kept { of, raster: Arc::new(raster(ui, image, area)) });
-    ui.data_mut(|data| data.insert_temp(id, kept.clone()));
-    Some(kept.raster)
+    let cached = ui.data(|data| data.get_temp::<CachedPatch>(id)).filter(|cached| cached.of == of);
+    let cached = cached.unwrap_or_else(|| CachedPatch { of, raster: Arc::new(raster(ui, image, area)) });
+    ui.data_mut(|data| data.insert_temp(id, cached.clone()));
+    Some(cached.raster)
 }
 
-/// A patch of the last frame: traverse, step and pixels.
+/// The patch of the previous frame, identified by traverse, step and area.
 #[derive(Clone)]
-struct Kept {
+struct CachedPatch {
     of: (String, usize, PixelRect),
     raster: Arc<Raster>,
 }

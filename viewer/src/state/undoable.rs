@@ -1,7 +1,7 @@
-//! The user's last changes (deeds), each with the data to undo it.
+//! The user's undoable changes, each with the data to undo it.
 //!
-//! It covers picks, removed and renamed targets, runs, breakpoints, derived plots and notes, branches, the draft of settings and what is
-//! tried. Nothing that was computed is lost by taking a deed back: targets and runs are hidden, and shown again.
+//! A change is a pick, a removed or renamed target, a run, breakpoint, derived plot or note, a branch, or a change of the
+//! draft settings or of the trial. Undo loses no computed result: it hides targets and runs, and redo shows them again.
 
 use sightline_session::what_if::WhatIf;
 use sightline_track::settings::Changes;
@@ -9,29 +9,29 @@ use sightline_track::settings::Changes;
 use crate::cache::StepKey;
 use crate::state::rows::run_letter;
 
-/// A change by the user.
+/// An undoable change by the user.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Deed {
+pub enum UndoableChange {
     /// Designated a target.
     Picked {
-        /// Its number.
+        /// The target's number.
         target: usize,
     },
     /// Removed a target.
     RemovedTarget {
-        /// Its number.
+        /// The target's number.
         target: usize,
     },
     /// Renamed a target.
     Renamed {
-        /// Its number.
+        /// The target's number.
         target: usize,
-        /// Its former name.
+        /// The former name.
         before: String,
-        /// Its new name.
+        /// The new name.
         after: String,
     },
-    /// Left a run.
+    /// Forked a run.
     Branched {
         /// The target's number.
         target: usize,
@@ -47,21 +47,21 @@ pub enum Deed {
     },
     /// Removed a breakpoint.
     RemovedBreakpoint {
-        /// Its condition.
+        /// Its condition, as an expression.
         expression: String,
-        /// Whether it was on.
+        /// Whether it was enabled.
         is_on: bool,
     },
     /// Removed a derived plot.
     RemovedPlot {
-        /// Its expression.
+        /// The plotted expression.
         expression: String,
-        /// Its place among the plots.
+        /// Its index among the plots.
         place: usize,
     },
     /// Removed a note.
     RemovedNote {
-        /// Its number.
+        /// The note's number.
         id: u64,
         /// The step to which it is pinned.
         step: usize,
@@ -84,28 +84,28 @@ pub enum Deed {
     },
 }
 
-/// The deeds that can be taken back, and those that were.
+/// The changes that can be undone, and those that can be redone.
 #[derive(Default)]
 pub struct Undo {
-    pub(super) done: Vec<Deed>,
-    pub(super) undone: Vec<Deed>,
-    /// Raised by every deed, and by taking one back.
+    pub(super) done: Vec<UndoableChange>,
+    pub(super) undone: Vec<UndoableChange>,
+    /// Incremented by every change, undo and redo.
     pub(super) changes: u64,
 }
 
 impl Undo {
-    /// The last deed, and the last that was taken back.
-    pub fn ends(&self) -> (Option<&Deed>, Option<&Deed>) {
+    /// The change that undo reverts next, and the one that redo repeats next.
+    pub fn ends(&self) -> (Option<&UndoableChange>, Option<&UndoableChange>) {
         (self.done.last(), self.undone.last())
     }
 
-    /// Whether the deed with this number is the one that would be taken back next.
-    pub fn is_last(&self, deed: u64) -> bool {
-        self.changes == deed && !self.done.is_empty()
+    /// Whether undo would revert the change with this number next.
+    pub fn is_last(&self, change: u64) -> bool {
+        self.changes == change && !self.done.is_empty()
     }
 
-    /// Forgets the last deed, where it is this one: it was refused.
-    pub(crate) fn forget_last(&mut self, is_it: impl Fn(&Deed) -> bool) {
+    /// Forgets the last change if `is_it` matches it, because the server refused it.
+    pub(crate) fn forget_last(&mut self, is_it: impl Fn(&UndoableChange) -> bool) {
         if self.done.last().is_some_and(is_it) {
             self.done.pop();
             self.changes += 1;
@@ -113,8 +113,8 @@ impl Undo {
     }
 }
 
-impl Deed {
-    /// The deed in words.
+impl UndoableChange {
+    /// The change as a noun phrase.
     pub fn words(&self) -> String {
         match self {
             Self::Picked { target } => format!("the pick of target {}", target + 1),
@@ -132,8 +132,8 @@ impl Deed {
         }
     }
 
-    /// Whether `next` only goes on with this deed: the same setting dragged further, the same handle moved on.
-    pub(super) fn goes_on_with(&self, next: &Self) -> bool {
+    /// Whether `next` continues this change: the same setting or the same handle, dragged further.
+    pub(super) fn is_continued_by(&self, next: &Self) -> bool {
         match (self, next) {
             (Self::Drafted { before, after }, Self::Drafted { after: later, .. }) => {
                 keys_changed(before, after).is_some_and(|key| keys_changed(after, later) == Some(key))
@@ -157,11 +157,10 @@ impl Deed {
     }
 }
 
-/// The one key in which two sets of changes differ.
+/// The only key in which two sets of changes differ; `None` if they differ in none or several.
 fn keys_changed<'a>(a: &'a Changes, b: &'a Changes) -> Option<&'a String> {
     let differs = |key: &&String| a.get(*key) != b.get(*key);
     let mut keys: Vec<&String> = a.keys().chain(b.keys()).filter(differs).collect();
-    keys.dedup();
     keys.sort();
     keys.dedup();
     if keys.len() == 1 { keys.pop() } else { None }

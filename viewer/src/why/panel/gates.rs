@@ -1,4 +1,4 @@
-//! The gates by margin: value, limit, margin, and a slider by which the limit is tried.
+//! The gates by margin: value, limit, margin, and a slider that tries another limit.
 
 use egui::{RichText, Sense, Slider, Ui, WidgetInfo, pos2, vec2};
 use serde_json::json;
@@ -10,12 +10,12 @@ use sightline_track::stages::judge::{Gate, Verdict};
 use crate::command::Command;
 use crate::state::State;
 use crate::theme;
-use crate::why::Ask;
+use crate::why::WhyCommand;
 
-/// Height of a margin's bar, points.
+/// Height of the bar of a margin, points.
 const BAR: f32 = 8.0;
 
-/// Shows all of them.
+/// Shows all gates.
 pub(crate) fn show(ui: &mut Ui, state: &State, verdict: &Verdict, out: &mut Vec<Command>) {
     for margin in by_margin(&verdict.gates) {
         let gate = margin.gate;
@@ -29,7 +29,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, verdict: &Verdict, out: &mut Vec<
     }
 }
 
-/// Name, value, relation, limit and margin; the name leads to where the margin came from.
+/// Shows name, value, relation, limit and margin; a click on the name explains the margin.
 fn headline(ui: &mut Ui, step: usize, gate: &Gate, out: &mut Vec<Command>) {
     let relation = if gate.at_least { "≥" } else { "≤" };
     let [value, limit] = match gate.value {
@@ -49,11 +49,11 @@ fn headline(ui: &mut Ui, step: usize, gate: &Gate, out: &mut Vec<Command>) {
         ] {
             let link = ui.link(words.clone()).on_hover_text(format!("Why? Where {name} comes from"));
             if link.clicked() {
-                out.push(Command::Why(Ask::Value { step, value: name.clone() }));
+                out.push(Command::Why(WhyCommand::Value { step, value: name.clone() }));
             }
             link.context_menu(|ui| {
                 if ui.button("Why").clicked() {
-                    out.push(Command::Why(Ask::Value { step, value: name.clone() }));
+                    out.push(Command::Why(WhyCommand::Value { step, value: name.clone() }));
                     ui.close();
                 }
                 if ui.button("Copy value").clicked() {
@@ -67,7 +67,7 @@ fn headline(ui: &mut Ui, step: usize, gate: &Gate, out: &mut Vec<Command>) {
     });
 }
 
-/// The margin over the limit, from −1 to +1 about a line in the middle.
+/// Shows the margin relative to the limit, from −1 to +1 about the centre line.
 fn bar(ui: &mut Ui, gate: &Gate, relative: f64) {
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), BAR + 4.0), Sense::hover());
     let rail = egui::Rect::from_min_size(rect.min + vec2(0.0, 2.0), vec2(rect.width(), BAR));
@@ -86,23 +86,23 @@ fn bar(ui: &mut Ui, gate: &Gate, relative: f64) {
     response.on_hover_text("The margin over the limit, from −100 % to +100 %; the line is the limit.");
 }
 
-/// The limit's setting as it is tried.
+/// Shows a slider that tries another limit.
 fn limit_slider(ui: &mut Ui, state: &State, setting: &str, out: &mut Vec<Command>) {
     let Some(info) = state.settings.iter().find(|info| info.key == setting) else { return };
     let (Some(in_run), Some(tried)) = (
         state.setting(&info.group, setting).and_then(|value| value.as_f64()),
-        state.tried_setting(&info.group, setting).and_then(|value| value.as_f64()),
+        state.trial_setting(&info.group, setting).and_then(|value| value.as_f64()),
     ) else {
         return;
     };
     let Domain::Between(low, high) = info.domain else { return };
-    // A factor that may be a hundred is seldom dragged beyond five times what it is.
+    // A limit of up to 100 is rarely dragged beyond five times its value.
     let high = if high > 1.0 { high.min((5.0 * in_run).max(1.0)) } else { high };
     let mut value = tried;
     let name = theme::note(format!("try {}", setting_name(setting)));
     let response = ui.add(Slider::new(&mut value, low..=high).max_decimals(3).text(name));
     if response.on_hover_text(format!("Drag to try another {setting} at this step")).changed() {
         let new = (value != in_run).then(|| json!(value));
-        out.push(Command::Why(Ask::Change { key: setting.to_owned(), value: new }));
+        out.push(Command::Why(WhyCommand::Change { key: setting.to_owned(), value: new }));
     }
 }

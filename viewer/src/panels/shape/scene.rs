@@ -1,9 +1,9 @@
-//! Facets, lines and dots in space on the screen: orthographic, the farthest painted first.
+//! Orthographic projection of facets, lines and points to the screen, painted from far to near.
 //!
 //! ```text
-//! right = a × z,  down = a × right          a: from the eye to the middle, z: the rover's, which points down
+//! right = z × a,  down = a × right          a: from the view point to the centre, z: the rover's z axis, which points down
 //! ```
-//! The eye stands where the left camera does, turned about the middle by the orbit. Frame: rover, m.
+//! The view point is the left camera, rotated about the centre by the orbit. Frame: rover, m.
 
 use egui::{Color32, Mesh, Pos2, Rect, Shape, pos2};
 use nalgebra::{Rotation3, Unit};
@@ -16,24 +16,25 @@ use crate::theme;
 /// Half the width of a line, points.
 const LINE: f32 = 0.6;
 
-/// Takes points of the rover frame to the screen.
+/// Projects points of the rover frame to the screen.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Eye {
+pub(crate) struct OrthographicView {
     right: Vector3,
     down: Vector3,
     away: Vector3,
     middle: Point3,
-    /// Points for a metre.
+    /// Points per metre.
     pub(crate) scale: f64,
     rect: Rect,
 }
 
-impl Eye {
-    /// From `camera` to `middle`, turned by `orbit`; `reach_m` about the middle fits into `rect`.
+impl OrthographicView {
+    /// The view from `camera` to `middle`, rotated by `orbit`; a sphere of radius `reach_m` about `middle` fits into
+    /// `rect`.
     pub(crate) fn new(camera: &Point3, middle: Point3, reach_m: f64, orbit: Orbit, rect: Rect) -> Self {
         let sight = (middle - camera).try_normalize(1e-9).unwrap_or_else(Vector3::x);
         let sideways = sight.cross(&Vector3::z()).try_normalize(1e-9).unwrap_or_else(Vector3::y);
-        // Seen from above, z down: a positive turn about z goes to the right.
+        // Seen from above, with z down, a positive rotation about z is to the right.
         let yaw = Rotation3::from_axis_angle(&Vector3::z_axis(), -orbit.yaw_rad);
         let pitch = Rotation3::from_axis_angle(&Unit::new_normalize(-sideways), -orbit.pitch_rad);
         let away = yaw * (pitch * sight);
@@ -43,8 +44,8 @@ impl Eye {
         Self { right, down, away, middle, scale: fit * orbit.zoom, rect }
     }
 
-    /// The place on the screen, and how far from the middle along the line of sight, m.
-    pub(crate) fn see(&self, point: &Point3) -> (Pos2, f64) {
+    /// The screen position, and the distance from the centre along the line of sight, m.
+    pub(crate) fn project(&self, point: &Point3) -> (Pos2, f64) {
         let from = point - self.middle;
         let place = |axis: &Vector3| (from.dot(axis) * self.scale) as f32;
         let centre = self.rect.center();
@@ -52,19 +53,19 @@ impl Eye {
     }
 }
 
-/// What is painted, with its distance.
+/// The shapes to paint, each with its distance.
 pub(crate) struct Scene {
-    eye: Eye,
+    view: OrthographicView,
     parts: Vec<(f64, [Pos2; 3], Color32, bool)>,
 }
 
 impl Scene {
     /// An empty scene.
-    pub(crate) fn new(eye: Eye) -> Self {
-        Self { eye, parts: Vec::new() }
+    pub(crate) fn new(view: OrthographicView) -> Self {
+        Self { view, parts: Vec::new() }
     }
 
-    /// Facets, filled and shaded by how they face the eye, or as three lines each.
+    /// Adds facets, filled and shaded by their orientation, or as three lines each.
     pub(crate) fn facets<'a>(
         &mut self,
         facets: impl Iterator<Item = &'a Facet>,
@@ -73,18 +74,18 @@ impl Scene {
     ) {
         for facet in facets {
             let corners = facet.map(|corner| Point3::from(corner.map(f64::from)));
-            let seen = corners.map(|corner| self.eye.see(&corner));
+            let seen = corners.map(|corner| self.view.project(&corner));
             let depth_m = seen.iter().map(|(_, depth)| depth).sum::<f64>() / 3.0;
             let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
-            // Light comes from behind the eye, a little from above.
-            let light = (self.eye.away + self.eye.down * 0.5 + self.eye.right * 0.3).normalize();
+            // The light comes from behind the view point, slightly from above and from the left.
+            let light = (self.view.away + self.view.down * 0.5 + self.view.right * 0.3).normalize();
             let facing = normal.try_normalize(1e-15).map_or(0.0, |normal| normal.dot(&light).abs());
             let colour = if is_filled { theme::shaded(colour, facing) } else { colour };
             self.parts.push((depth_m, seen.map(|(at, _)| at), colour, is_filled));
         }
     }
 
-    /// The shapes, the farthest first.
+    /// The shapes, from far to near.
     pub(crate) fn shape(mut self) -> Shape {
         self.parts.sort_by(|a, b| b.0.total_cmp(&a.0));
         let mut mesh = Mesh::default();
@@ -120,15 +121,15 @@ fn line(mesh: &mut Mesh, [from, to]: [Pos2; 2], colour: Color32) {
 mod tests {
     use super::*;
 
-    fn eye(orbit: Orbit) -> Eye {
+    fn view(orbit: Orbit) -> OrthographicView {
         let rect = Rect::from_min_max(pos2(0.0, 0.0), pos2(200.0, 100.0));
-        Eye::new(&Point3::new(0.0, 0.0, 0.0), Point3::new(4.0, 0.0, 0.0), 0.5, orbit, rect)
+        OrthographicView::new(&Point3::new(0.0, 0.0, 0.0), Point3::new(4.0, 0.0, 0.0), 0.5, orbit, rect)
     }
 
     #[test]
     fn the_untouched_view_is_that_of_the_camera() {
-        let eye = eye(Orbit::default());
-        let (at, depth_m) = eye.see(&Point3::new(4.2, 0.25, 0.1));
+        let view = view(Orbit::default());
+        let (at, depth_m) = view.project(&Point3::new(4.2, 0.25, 0.1));
         // The rover's y is right, its z down; half a metre is 50 points.
         assert!((at - pos2(125.0, 60.0)).length() < 1e-3 && (depth_m - 0.2).abs() < 1e-9, "{at} {depth_m}");
     }
@@ -136,7 +137,7 @@ mod tests {
     #[test]
     fn a_turn_to_the_right_and_up_shows_what_lies_there_nearer() {
         let nearer = |orbit: Orbit, point: Point3| {
-            eye(orbit).see(&point).1 < eye(Orbit::default()).see(&point).1 - 0.05
+            view(orbit).project(&point).1 < view(Orbit::default()).project(&point).1 - 0.05
         };
         let right = Orbit { yaw_rad: 0.5, ..Orbit::default() };
         assert!(nearer(right, Point3::new(4.0, 0.3, 0.0)));
@@ -147,12 +148,12 @@ mod tests {
     #[test]
     fn the_nearest_is_painted_last() {
         let facet = |x: f32| [[x, 0.0, 0.0], [x, 0.1, 0.0], [x, 0.0, 0.1]];
-        let mut scene = Scene::new(eye(Orbit::default()));
+        let mut scene = Scene::new(view(Orbit::default()));
         let (near, far) = (theme::failed(), theme::prediction());
         scene.facets([facet(3.9)].iter(), near, true);
         scene.facets([facet(4.1)].iter(), far, true);
         let Shape::Mesh(mesh) = scene.shape() else { panic!("a mesh") };
-        // The farther one is the blue one.
+        // The farther facet is blue.
         let is_blue = |at: usize| mesh.vertices[at].color.b() > mesh.vertices[at].color.r();
         assert!(is_blue(0) && !is_blue(3));
     }

@@ -1,5 +1,5 @@
-//! Whole drives that are tried in the background: a change that *Why* names, driven again in a session of its own while the page
-//! stays where it is.
+//! Trial drives in the background: a change suggested by *Why* is driven again in a separate session, while the page stays
+//! on its own.
 
 use egui::{Label, RichText, Ui};
 use sightline_api::endpoint::Call;
@@ -11,36 +11,36 @@ use sightline_session::driving::DriveView;
 use sightline_session::stop_cause::DecisionChange;
 
 use crate::command::Command;
-use crate::driving::{Ask, words};
+use crate::driving::{DrivingCommand, words};
 use crate::files;
 use crate::state::State;
 use crate::state::calls::Notice;
 use crate::theme;
 
-/// A drive that is tried.
+/// A trial drive.
 #[derive(Clone, Debug)]
-pub struct TriedDrive {
-    /// The session of the drive that stopped.
+pub struct TrialDrive {
+    /// The session of the stopped drive.
     origin: String,
-    /// The change in words, as *Why* has it.
+    /// Description of the change, as in *Why*.
     change: String,
-    /// The session of the tried drive; `None` while its world is made.
+    /// The session of the trial drive; `None` while its world is being built.
     session: Option<String>,
-    /// The drive as it was read last.
+    /// The drive as last read.
     view: Option<DriveView>,
-    is_asked: bool,
+    is_pending: bool,
     is_stale: bool,
 }
 
-impl TriedDrive {
-    /// Whether the drive has ended, on the way or at its goal.
+impl TrialDrive {
+    /// Whether the drive has ended, before or at its goal.
     fn has_ended(&self) -> bool {
         let last = self.view.as_ref().and_then(|view| view.cycles.last());
         last.is_some_and(|cycle| cycle.ending.is_some())
     }
 
-    /// How it stands, and whether it has arrived; `None` while that is open.
-    fn standing(&self) -> (String, Option<bool>) {
+    /// A description of its state, and whether it has arrived; `None` until it has ended.
+    fn status(&self) -> (String, Option<bool>) {
         let Some(view) = &self.view else { return ("making its world …".to_owned(), None) };
         let last = view.cycles.last();
         match (last.and_then(|cycle| cycle.ending.as_ref()), last) {
@@ -55,8 +55,8 @@ impl TriedDrive {
 }
 
 impl State {
-    /// Tries the whole drive again, from the stop at which its command began, under another command.
-    pub(super) fn try_drive(&mut self, command: DriveCommand, change: String) {
+    /// Repeats the whole drive under another command, from the stop at which the original command began.
+    pub(super) fn begin_trial_drive(&mut self, command: DriveCommand, change: String) {
         let begun = self.drive().and_then(|drive| {
             let steering = drive.steering.as_ref()?;
             let since = steering.command.since.unwrap_or(0);
@@ -64,7 +64,7 @@ impl State {
             Some((steering.target, steering.run, steering.then.clone(), first.step))
         });
         let (Some((target, run, then, from_step)), Some(origin)) = (begun, self.session_id()) else { return };
-        if self.tried_drive(&change).is_some() {
+        if self.trial_drive(&change).is_some() {
             return;
         }
         let new = NewDrive {
@@ -77,12 +77,12 @@ impl State {
         };
         let call = Call::with_body::<BeginDrive>(&AtRun { session: origin.clone(), target, run }, &new);
         let key = (origin.clone(), change.clone());
-        self.driving.tried.push(TriedDrive {
+        self.driving.trials.push(TrialDrive {
             origin,
             change,
             session: None,
             view: None,
-            is_asked: false,
+            is_pending: false,
             is_stale: true,
         });
         let failed = key.clone();
@@ -90,83 +90,83 @@ impl State {
             call,
             move |state, view| {
                 state.read_traverses();
-                match state.tried_drive_mut(&key) {
-                    Some(tried) => tried.session = Some(view.id),
-                    None => state.remove_tried_session(view.id),
+                match state.trial_drive_mut(&key) {
+                    Some(trial) => trial.session = Some(view.id),
+                    None => state.remove_trial_session(view.id),
                 }
             },
             move |state, _| {
-                state.forget_tried_drive(&failed);
+                state.forget_trial_drive(&failed);
                 Notice::Card
             },
         );
     }
 
-    /// The drive that is tried with a change of the open one.
-    fn tried_drive(&self, change: &str) -> Option<&TriedDrive> {
+    /// The trial drive of the open session with this change.
+    fn trial_drive(&self, change: &str) -> Option<&TrialDrive> {
         let origin = &self.session.as_ref()?.id;
-        self.driving.tried.iter().find(|tried| tried.origin == *origin && tried.change == change)
+        self.driving.trials.iter().find(|trial| trial.origin == *origin && trial.change == change)
     }
 
-    fn tried_drive_mut(&mut self, (origin, change): &(String, String)) -> Option<&mut TriedDrive> {
-        let mut all = self.driving.tried.iter_mut();
-        all.find(|tried| tried.origin == *origin && tried.change == *change)
+    fn trial_drive_mut(&mut self, (origin, change): &(String, String)) -> Option<&mut TrialDrive> {
+        let mut all = self.driving.trials.iter_mut();
+        all.find(|trial| trial.origin == *origin && trial.change == *change)
     }
 
-    fn forget_tried_drive(&mut self, (origin, change): &(String, String)) {
-        self.driving.tried.retain(|tried| tried.origin != *origin || tried.change != *change);
+    fn forget_trial_drive(&mut self, (origin, change): &(String, String)) {
+        self.driving.trials.retain(|trial| trial.origin != *origin || trial.change != *change);
     }
 
-    /// Ends a tried drive and removes its session.
-    pub(super) fn cancel_tried_drive(&mut self, change: String) {
+    /// Ends a trial drive and removes its session.
+    pub(super) fn cancel_trial_drive(&mut self, change: String) {
         let Some(origin) = self.session_id() else { return };
         let key = (origin, change);
-        let session = self.tried_drive_mut(&key).and_then(|tried| tried.session.clone());
-        self.forget_tried_drive(&key);
+        let session = self.trial_drive_mut(&key).and_then(|trial| trial.session.clone());
+        self.forget_trial_drive(&key);
         if let Some(session) = session {
-            self.remove_tried_session(session);
+            self.remove_trial_session(session);
         }
     }
 
-    fn remove_tried_session(&mut self, session: String) {
+    fn remove_trial_session(&mut self, session: String) {
         let call = Call::to::<RemoveSession>(&AtSession { session });
         self.call::<RemoveSession>(call, |_, _| {});
     }
 
-    /// Notes that a session went on, which may be that of a tried drive.
-    pub(crate) fn tried_drive_went_on(&mut self, session: &str) {
-        let all = self.driving.tried.iter_mut();
-        all.filter(|tried| tried.session.as_deref() == Some(session)).for_each(|tried| tried.is_stale = true);
+    /// Records that a session advanced, which may be the one of a trial drive.
+    pub(crate) fn mark_trial_drive_stale(&mut self, session: &str) {
+        let all = self.driving.trials.iter_mut();
+        all.filter(|trial| trial.session.as_deref() == Some(session)).for_each(|trial| trial.is_stale = true);
     }
 
-    /// Notes that tried drives may have gone on while the server did not answer.
-    pub(crate) fn tried_drives_stale(&mut self) {
-        self.driving.tried.iter_mut().for_each(|tried| (tried.is_stale, tried.is_asked) = (true, false));
+    /// Records that trial drives may have advanced while the server was unreachable.
+    pub(crate) fn mark_trial_drives_stale(&mut self) {
+        self.driving.trials.iter_mut().for_each(|trial| (trial.is_stale, trial.is_pending) = (true, false));
     }
 
-    /// Forgets the tried drive whose session was removed.
-    pub(crate) fn tried_drive_removed(&mut self, session: &str) {
-        self.driving.tried.retain(|tried| tried.session.as_deref() != Some(session));
+    /// Discards the trial drive whose session was removed.
+    pub(crate) fn trial_drive_removed(&mut self, session: &str) {
+        self.driving.trials.retain(|trial| trial.session.as_deref() != Some(session));
     }
 
-    /// Reads the tried drives that have gone on.
-    pub(crate) fn sync_tried_drives(&mut self) {
-        let mut asked = Vec::new();
-        for tried in &mut self.driving.tried {
-            let Some(session) = tried.session.clone().filter(|_| tried.is_stale && !tried.is_asked) else {
+    /// Reads the trial drives that have advanced.
+    pub(crate) fn sync_trial_drives(&mut self) {
+        let mut stale = Vec::new();
+        for trial in &mut self.driving.trials {
+            let Some(session) = trial.session.clone().filter(|_| trial.is_stale && !trial.is_pending) else {
                 continue;
             };
-            (tried.is_asked, tried.is_stale) = (true, false);
-            asked.push(session);
+            (trial.is_pending, trial.is_stale) = (true, false);
+            stale.push(session);
         }
-        for session in asked {
+        for session in stale {
             let call = Call::to::<ShowDrive>(&AtSession { session: session.clone() });
             let answered = session.clone();
             let read = move |state: &mut Self, view: Option<DriveView>| {
-                let all = state.driving.tried.iter_mut();
-                for tried in all.filter(|tried| tried.session.as_deref() == Some(&answered)) {
-                    tried.is_asked = false;
-                    tried.view = view.clone().or(tried.view.take());
+                let all = state.driving.trials.iter_mut();
+                for trial in all.filter(|trial| trial.session.as_deref() == Some(&answered)) {
+                    trial.is_pending = false;
+                    trial.view = view.clone().or(trial.view.take());
                 }
             };
             let failed = read.clone();
@@ -182,32 +182,35 @@ impl State {
     }
 }
 
-/// The button that tries a change, or how the drive with it stands.
+/// Shows the button that tries a change, or the state of the drive with it.
 pub(super) fn show(ui: &mut Ui, state: &State, change: &DecisionChange, out: &mut Vec<Command>) {
     let Some(command) = &change.command else { return };
-    let Some(tried) = state.tried_drive(&change.text) else {
+    let Some(trial) = state.trial_drive(&change.text) else {
         let help = "Drives the whole way again with this change, in the background and in a session of its own; this page stays here";
         let name = format!("try the drive with {}", change.text);
         if ui.small_button("Try the drive").accessible_name(name).on_hover_text(help).clicked() {
-            out.push(Command::Drive(Ask::Try { command: command.clone(), change: change.text.clone() }));
+            out.push(Command::Drive(DrivingCommand::Try {
+                command: command.clone(),
+                change: change.text.clone(),
+            }));
         }
         return;
     };
-    if let Some(session) = &tried.session {
+    if let Some(session) = &trial.session {
         let name = format!("open the drive with {}", change.text);
         let help = "Opens the session of this drive; the present one stays in the list";
         if ui.small_button("Open").accessible_name(name).on_hover_text(help).clicked() {
-            out.push(Command::Files(files::Ask::Resume(session.clone())));
+            out.push(Command::Files(files::FilesCommand::Resume(session.clone())));
         }
     }
-    if !tried.has_ended() {
+    if !trial.has_ended() {
         let name = format!("cancel the drive with {}", change.text);
         let help = "Ends this drive and removes its session";
         if ui.small_button("Cancel").accessible_name(name).on_hover_text(help).clicked() {
-            out.push(Command::Drive(Ask::CancelTried(change.text.clone())));
+            out.push(Command::Drive(DrivingCommand::CancelTrial(change.text.clone())));
         }
     }
-    let (text, arrived) = tried.standing();
+    let (text, arrived) = trial.status();
     let colour = arrived.map_or_else(theme::text, theme::verdict);
     ui.add(Label::new(RichText::new(text).size(12.0).color(colour)).wrap());
 }
@@ -223,7 +226,7 @@ mod tests {
 
     const CHANGE: &str = "tilt limit 17.2° instead of 16°";
 
-    /// A drive that stopped at the stop that is looked at, with one change of its command.
+    /// A drive that stopped at the cursor's stop, with one suggested change of its command.
     fn stopped(context: &egui::Context) -> State {
         let mut state = fixture::at_step(context, 2);
         let steering = json!({ "target": 0, "run": 0, "command": { "standoff_m": 1.5 } });
@@ -241,13 +244,13 @@ mod tests {
         state
     }
 
-    fn tried(session: Option<&str>) -> State {
+    fn trial(session: Option<&str>) -> State {
         let mut state = stopped(&egui::Context::default());
-        state.perform(Command::Drive(Ask::Try {
+        state.perform(Command::Drive(DrivingCommand::Try {
             command: DriveCommand::default(),
             change: CHANGE.to_owned(),
         }));
-        state.driving.tried[0].session = session.map(str::to_owned);
+        state.driving.trials[0].session = session.map(str::to_owned);
         let _ = calls(&mut state);
         state
     }
@@ -263,18 +266,18 @@ mod tests {
         calls.filter(|(path, _): &(String, _)| !path.starts_with("sessions/s1/drive")).collect()
     }
 
-    /// The card of the stopped drive, with these tried drives.
-    fn shown(all: Vec<TriedDrive>) -> Shown<'static> {
+    /// The card of the stopped drive, with these trial drives.
+    fn shown(all: Vec<TrialDrive>) -> Shown<'static> {
         let state = move |context: &egui::Context| {
             let mut state = stopped(context);
-            state.driving.tried = all;
+            state.driving.trials = all;
             state
         };
         Shown::new([520.0, 420.0], state, why::show_here)
     }
 
     #[test]
-    fn a_tried_drive_begins_where_its_command_began() {
+    fn a_trial_drive_starts_where_its_command_started() {
         let commands = shown(Vec::new()).click(&format!("try the drive with {CHANGE}"));
         let mut state = stopped(&egui::Context::default());
         let _ = calls(&mut state);
@@ -283,8 +286,8 @@ mod tests {
         let body = body.unwrap();
         assert_eq!(path, "sessions/s1/targets/0/runs/0/drive");
         assert_eq!((&body["from_step"], &body["command"]["exemption_radius_m"]), (&json!(0), &json!(2.0)));
-        shown(state.driving.tried.clone()).says("making its world");
-        state.perform(Command::Drive(Ask::Try {
+        shown(state.driving.trials.clone()).says("making its world");
+        state.perform(Command::Drive(DrivingCommand::Try {
             command: DriveCommand::default(),
             change: CHANGE.to_owned(),
         }));
@@ -292,9 +295,9 @@ mod tests {
     }
 
     #[test]
-    fn a_tried_drive_is_read_as_it_goes_on_and_says_how_it_ended() {
-        let mut state = tried(Some("s7"));
-        state.driving.tried[0].is_asked = false;
+    fn a_trial_drive_is_read_until_it_ends() {
+        let mut state = trial(Some("s7"));
+        state.driving.trials[0].is_pending = false;
         let event = Event::RunProgress {
             session: "s7".to_owned(),
             target: 0,
@@ -304,7 +307,7 @@ mod tests {
             ended: false,
             doing: "tracking".to_owned(),
         };
-        state.told(event);
+        state.apply_event(event);
         assert_eq!(calls(&mut state), [("sessions/s7/drive".to_owned(), None)]);
         assert_eq!(calls(&mut state), [], "it is read again only when it has gone on");
 
@@ -313,36 +316,36 @@ mod tests {
             let view = json!({ "steering": null, "cycles": cycles, "summary": null, "is_driving": true });
             Some(serde_json::from_value(view).unwrap())
         };
-        state.driving.tried[0].view = view(&cycles);
-        let standing = shown(state.driving.tried.clone());
+        state.driving.trials[0].view = view(&cycles);
+        let standing = shown(state.driving.trials.clone());
         standing.says("drives, stop 1");
         assert!(standing.has(&format!("cancel the drive with {CHANGE}")));
         cycles[1]["ending"] = json!({ "reason": "arrived", "value": 0.02, "limit": 0.05 });
-        state.driving.tried[0].view = view(&cycles);
-        let ended = shown(state.driving.tried.clone());
+        state.driving.trials[0].view = view(&cycles);
+        let ended = shown(state.driving.trials.clone());
         ended.says("arrived: 2.0 cm from the goal");
         assert!(!ended.has(&format!("cancel the drive with {CHANGE}")));
         assert!(ended.has(&format!("open the drive with {CHANGE}")));
     }
 
     #[test]
-    fn cancelling_a_tried_drive_removes_its_session() {
-        let mut state = tried(Some("s7"));
-        let commands = shown(state.driving.tried.clone()).click(&format!("cancel the drive with {CHANGE}"));
+    fn cancelling_a_trial_drive_removes_its_session() {
+        let mut state = trial(Some("s7"));
+        let commands = shown(state.driving.trials.clone()).click(&format!("cancel the drive with {CHANGE}"));
         commands.into_iter().for_each(|command| state.perform(command));
         assert!(calls(&mut state).contains(&("sessions/s7".to_owned(), None)));
-        assert!(state.driving.tried.is_empty());
+        assert!(state.driving.trials.is_empty());
     }
 
     #[test]
-    fn a_tried_drive_belongs_to_the_session_whose_drive_stopped() {
-        let mut state = tried(Some("s7"));
-        assert!(state.tried_drive(CHANGE).is_some());
+    fn a_trial_drive_belongs_to_the_session_of_the_stopped_drive() {
+        let mut state = trial(Some("s7"));
+        assert!(state.trial_drive(CHANGE).is_some());
         if let Some(session) = &mut state.session {
             session.id = "s2".to_owned();
         }
-        assert!(state.tried_drive(CHANGE).is_none());
-        state.told(Event::SessionRemoved { session: "s7".to_owned() });
-        assert!(state.driving.tried.is_empty());
+        assert!(state.trial_drive(CHANGE).is_none());
+        state.apply_event(Event::SessionRemoved { session: "s7".to_owned() });
+        assert!(state.driving.trials.is_empty());
     }
 }

@@ -1,4 +1,4 @@
-//! The surface of match scores over the search window, with its peaks, the threshold and the prediction.
+//! The score map of the match over the search window, with its peaks, the threshold and the prediction.
 
 use egui::{Align2, Margin, Rect, Ui, pos2, vec2};
 use sightline_geometry::frames::Pixel;
@@ -10,23 +10,23 @@ use sightline_vision::image::PixelRect;
 use crate::cache::Slot;
 use crate::command::{Command, Zoomable};
 use crate::drawing::overlay::{Mark, Overlay};
-use crate::drawing::raster::{Look, Raster};
+use crate::drawing::raster::{ColourMap, Raster};
 use crate::drawing::view2d::Canvas;
+use crate::hovered::Hovered;
 use crate::panels::pane::{Need, Pane};
 use crate::panels::panel::{Panel, TableOf};
 use crate::panels::score_marks::{paint_contour, paint_marks, region_of};
 use crate::panels::sheets;
 use crate::panels::status_line::STATUS;
-use crate::pointed::Pointed;
 use crate::state::State;
 use crate::{panels, theme};
 
-/// What the panel is for.
+/// The purpose of the panel.
 const PURPOSE: &str = Pane::Surface.about().help;
 
 /// Width of the colour bar with its numbers, points.
 const BAR: f32 = 62.0;
-/// Ticks of the colour bar, both ends among them.
+/// Number of ticks of the colour bar, both ends included.
 const TICKS: u32 = 5;
 
 /// The panel of match scores.
@@ -50,7 +50,7 @@ impl Panel for Scores {
     }
 }
 
-/// Shows the surface.
+/// Shows the scores: of compared runs, of tried changes, or of the run.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     if crate::compare::panel::surfaces::show(ui, state, out) {
         return;
@@ -61,7 +61,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     recorded(ui, state, out);
 }
 
-/// Shows the scores of the run.
+/// Shows the recorded scores of the run.
 pub(crate) fn recorded(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     let matched = state.trace().and_then(|trace| trace.template()).and_then(|e| e.match_template.as_ref());
     let (Some(trace), Some(matched)) = (state.trace(), matched) else {
@@ -80,16 +80,16 @@ pub(crate) fn recorded(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
         }
         Slot::Absent | Slot::Loading => return panels::missing(ui, PURPOSE, "Loading the scores …"),
     };
-    raster.look(Look::Values(matched.measure.shown_limits()));
+    raster.set_colour_map(ColourMap::Values(matched.measure.shown_limits()));
     let area = ui.available_rect_before_wrap();
     let (rest, bar) = area.split_left_right_at_x(area.right() - BAR);
     let mut left = ui.new_child(egui::UiBuilder::new().max_rect(rest).id_salt("scores"));
     let region = region_of(matched.search_window, raster.size());
-    let canvas = Canvas::new(&mut left, state.view(Zoomable::Surface), region, STATUS);
+    let canvas = Canvas::new(&mut left, state.view(Zoomable::ScoreMap), region, STATUS);
     canvas.checker(region);
     canvas.texture(&raster.texture, region);
     let threshold = state.run_settings().limits.ncc_min as f32;
-    // The threshold is one of correlation.
+    // The threshold applies to correlation scores only.
     let threshold = (matched.measure == Measure::Ncc).then_some(threshold);
     if state.marks {
         if let Some(threshold) = threshold {
@@ -99,17 +99,17 @@ pub(crate) fn recorded(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
     }
     warn_of_edge(&canvas, matched);
     let here = canvas.hovered(region).map(|pixel| Pixel::new(pixel.x.round(), pixel.y.round()));
-    let pointed = state.pointed_left().filter(|pixel| region.contains(*pixel));
-    if let Some(pixel) = pointed.filter(|_| here.is_none()) {
+    let hovered = state.hovered_left().filter(|pixel| region.contains(*pixel));
+    if let Some(pixel) = hovered.filter(|_| here.is_none()) {
         Overlay::new(&canvas.painter, &canvas.transform).mark(pixel, Mark::Plus, theme::accent());
     }
-    status(&mut left, here.or(pointed), raster, region, matched);
-    out.extend(here.map(|pixel| Command::Point(Pointed::Score(pixel))));
+    status(&mut left, here.or(hovered), raster, region, matched);
+    out.extend(here.map(|pixel| Command::Hover(Hovered::Score(pixel))));
     let bar = bar.shrink2(vec2(4.0, 2.0)).with_max_y(bar.bottom() - STATUS);
     colour_bar(ui, bar, matched, threshold, theme::run(state.cursor.run));
     ui.advance_cursor_after_rect(area);
     if let Some(view) = canvas.moved {
-        out.push(Command::View(Zoomable::Surface, view));
+        out.push(Command::View(Zoomable::ScoreMap, view));
     }
 }
 
@@ -131,11 +131,11 @@ fn warn_of_edge(canvas: &Canvas, matched: &TemplateMatch) {
     }
 }
 
-/// The pixel that is pointed at with its score, else what the surface holds.
-fn status(ui: &mut Ui, pointed: Option<Pixel>, raster: &Raster, region: PixelRect, matched: &TemplateMatch) {
+/// The pointed pixel with its score; else the number of positions in the score map.
+fn status(ui: &mut Ui, hovered: Option<Pixel>, raster: &Raster, region: PixelRect, matched: &TemplateMatch) {
     ui.horizontal(|ui| {
         ui.set_height(STATUS - 6.0);
-        let Some(pixel) = pointed else {
+        let Some(pixel) = hovered else {
             let flat = if matched.flat_positions > 0 {
                 format!(", {} flat", matched.flat_positions)
             } else {
@@ -155,7 +155,7 @@ fn status(ui: &mut Ui, pointed: Option<Pixel>, raster: &Raster, region: PixelRec
     });
 }
 
-/// The colour bar between the measure's limits with ticks, the threshold and the peak.
+/// The colour bar over the measure's range with ticks, the threshold and the peak.
 fn colour_bar(ui: &Ui, area: Rect, matched: &TemplateMatch, threshold: Option<f32>, run: egui::Color32) {
     let painter = ui.painter();
     let strip = Rect::from_min_max(area.min + vec2(2.0, 8.0), pos2(area.left() + 13.0, area.bottom() - 8.0));

@@ -1,4 +1,4 @@
-//! Applies answers and events of the server to the state.
+//! Applies replies and events of the server to the state.
 
 use std::collections::BTreeSet;
 
@@ -14,9 +14,9 @@ use crate::cache::{Key, StepKey};
 use crate::command::Mode;
 use crate::exports::as_text;
 use crate::net::events::Connection;
-use crate::net::request::{Arrived, Reply, Request};
-use crate::state::deeds::Deed;
+use crate::net::request::{CompletedRequest, Reply, Request};
 use crate::state::effect::Effect;
+use crate::state::undoable::UndoableChange;
 use crate::state::{Progress, State, run_letter};
 use crate::tour::Turn;
 
@@ -31,20 +31,20 @@ impl State {
     }
 
     /// Applies an answer.
-    pub fn arrived(&mut self, arrived: Arrived, now: f64) {
-        match (arrived.request, arrived.outcome) {
+    pub fn apply_reply(&mut self, completed: CompletedRequest, now: f64) {
+        match (completed.request, completed.outcome) {
             (Request::Item(key), Ok(Reply::Item(item))) => {
-                self.cache.arrived(key, Ok(item), now);
+                self.cache.store(key, Ok(item), now);
                 self.forget_begun_steps();
             }
-            (Request::Item(key), Err(problem)) => self.cache.arrived(key, Err(problem), now),
-            (Request::Call { ticket, .. }, outcome) => self.answered_call(ticket, outcome),
+            (Request::Item(key), Err(problem)) => self.cache.store(key, Err(problem), now),
+            (Request::Call { ticket, .. }, outcome) => self.finish_call(ticket, outcome),
             (Request::Item(_) | Request::Reconnect, _) => {}
         }
     }
 
-    /// Applies an event, which the server sends to every page.
-    pub fn told(&mut self, event: Event) {
+    /// Applies an event. The server sends every event to every page.
+    pub fn apply_event(&mut self, event: Event) {
         let is_ours = |session: &str| self.session.as_ref().is_some_and(|open| open.id == session);
         match event {
             Event::SessionChanged { session } => {
@@ -60,24 +60,26 @@ impl State {
                 } else {
                     self.progress.insert((target, run), Progress { k, n, doing });
                 }
-                self.run_went_on(target, run);
-                self.drive_went_on();
+                self.on_run_progress(target, run);
+                self.mark_drive_stale();
             }
-            Event::RunProgress { session, .. } => self.tried_drive_went_on(&session),
-            Event::CursorMoved { session, cursor } if is_ours(&session) => self.cursor_went(cursor),
+            Event::RunProgress { session, .. } => self.mark_trial_drive_stale(&session),
+            Event::CursorMoved { session, cursor } if is_ours(&session) => self.on_cursor_moved(cursor),
             Event::CursorMoved { .. } => {}
             Event::RenderProgress { traverse, k, n, ready } => self.rendered(&traverse, k, n, ready),
-            Event::StudyProgress { job } => self.study_went_on(job),
-            Event::TrackabilityProgress { traverse, step, .. } => self.trackability_went_on(&traverse, step),
+            Event::StudyProgress { job } => self.update_study(job),
+            Event::TrackabilityProgress { traverse, step, .. } => {
+                self.on_trackability_progress(&traverse, step)
+            }
             Event::QuestionProgress { session, target, run, step, .. } => {
-                self.question_went_on(StepKey { session, target, run, step });
+                self.on_question_progress(StepKey { session, target, run, step });
             }
             Event::NotesChanged { session } => self.notes_changed(session),
             Event::SessionRemoved { session } => {
-                self.tried_drive_removed(&session);
+                self.trial_drive_removed(&session);
                 self.session_removed(&session);
             }
-            Event::ImportProgress { job } => self.import_went_on(job),
+            Event::ImportProgress { job } => self.update_import(job),
             Event::TraverseRemoved { traverse } => self.drive_removed(&traverse),
         }
     }
@@ -97,7 +99,7 @@ impl State {
                 self.follow_import();
                 self.catch_up();
             }
-            // Before the first connection an event can only have been missed since the first answers.
+            // Events may have been missed between the first replies and the first connection.
             (_, Connection::Live) => self.sync.session_stale = true,
             (Connection::Live | Connection::Connecting, Connection::Gone { .. }) => {
                 let hint = "Start it with `sightline serve`; the steps that are loaded stay browsable.";
@@ -110,13 +112,13 @@ impl State {
     /// Requests everything that may have changed while the server was unreachable.
     fn catch_up(&mut self) {
         self.cache.retry(|_| true);
-        self.ask_why_again();
+        self.request_explanation_again();
         self.sync.keeps_cursor = true;
         self.forget_comparisons(false);
         self.progress.clear();
         self.sync.session_stale = true;
         self.trackability_stale();
-        self.tried_drives_stale();
+        self.mark_trial_drives_stale();
         self.studies.make_stale();
         if self.settings.is_empty() {
             self.read_settings();
@@ -150,7 +152,7 @@ impl State {
         self.outbox.add(Effect::OpenUrl(url));
     }
 
-    /// Shows a refusal; `is_shown_in_place`: in the list of messages alone.
+    /// Shows a refusal. If `is_shown_in_place`, the panel shows it already, and only the list of messages gets it.
     pub(crate) fn show_refusal(&mut self, call: &Call, problem: &Problem, is_shown_in_place: bool) {
         if problem.status != 0 {
             self.messages.refused(problem, format!("{} {}", call.method, call.path), !is_shown_in_place);
@@ -161,7 +163,7 @@ impl State {
         }
     }
 
-    fn took_traverses(&mut self, list: Vec<TraverseEntry>) {
+    fn on_traverses_reply(&mut self, list: Vec<TraverseEntry>) {
         self.traverses = Some(list);
         if self.session.is_none() && self.sync.linked.is_none() {
             self.open_first();
@@ -175,14 +177,14 @@ impl State {
         }
     }
 
-    /// Opens the latest session of a traverse, or begins one.
+    /// Opens the latest session of a traverse, or starts one.
     pub(crate) fn open(&mut self, traverse: String) {
         self.sync.opening = Some(traverse);
         let sessions = Call::to::<ListSessions>(&Anywhere {});
-        self.call::<ListSessions>(sessions, |state, list| state.took_sessions(&list));
+        self.call::<ListSessions>(sessions, |state, list| state.on_sessions_reply(&list));
     }
 
-    fn took_sessions(&mut self, list: &[SessionEntry]) {
+    fn on_sessions_reply(&mut self, list: &[SessionEntry]) {
         let Some(traverse) = self.sync.opening.take() else { return };
         let latest = list.iter().rev().find(|entry| entry.traverse == traverse);
         match latest {
@@ -191,11 +193,11 @@ impl State {
         }
     }
 
-    /// Begins a session on a traverse.
+    /// Starts a session on a traverse.
     pub(crate) fn begin_session(&mut self, traverse: String) {
         let begin = Call::with_body::<BeginSession>(&Anywhere {}, &NewSession { traverse });
         self.call::<BeginSession>(begin, |state, view| {
-            state.sync.session_asked = None;
+            state.sync.session_read = None;
             state.adopt(view, false);
         });
     }
@@ -208,7 +210,7 @@ impl State {
     /// Reads the list of traverses.
     pub(crate) fn read_traverses(&mut self) {
         let traverses = Call::to::<ListTraverses>(&Anywhere {});
-        self.call::<ListTraverses>(traverses, Self::took_traverses);
+        self.call::<ListTraverses>(traverses, Self::on_traverses_reply);
     }
 
     fn read_traverse(&mut self, id: String) {
@@ -216,21 +218,21 @@ impl State {
         self.call::<ShowTraverse>(traverse, |state, view| state.traverse = Some(view));
     }
 
-    /// Replaces the open session. The cursor stays unless another page moved it.
+    /// Replaces the open session. The cursor is kept unless another page moved it.
     pub(crate) fn adopt(&mut self, view: SessionView, moved_meanwhile: bool) {
         let is_other = self.session.as_ref().is_none_or(|open| open.id != view.id);
-        self.ask.make_stale();
+        self.breakpoints.make_stale();
         if is_other {
-            // Notes of the first session are about opening it.
+            // Messages shown before the first session was open are about opening it.
             if self.session.is_some() {
                 self.messages.leave_session();
-                // Its cards are about the drive that was left.
+                // The tour refers to the previous drive.
                 if self.tour.at.is_some() {
                     self.tour.turn(Turn::End);
                 }
             }
             self.open_notes(&view.id);
-            self.ask.forget();
+            self.breakpoints.forget();
             self.messages.forget_session();
             self.progress.clear();
             (self.sync.cursor_stale, self.sync.runs_ahead) = (false, BTreeSet::new());
@@ -240,13 +242,13 @@ impl State {
             self.hidden_targets.clear();
             self.target_colours.clear();
             (self.designating, self.refusal, self.rendering) = (None, None, None);
-            self.forget_deeds();
+            self.forget_changes();
             self.why.leave_session();
         }
-        self.drive_went_on();
+        self.mark_drive_stale();
         match &self.traverse {
             Some(open) if open.id == view.traverse => {
-                // A drive on commands has come to another stop.
+                // A commanded drive has reached another stop.
                 if open.stops.len() < view.stop_count {
                     self.read_traverse(view.traverse.clone());
                 }
@@ -257,13 +259,13 @@ impl State {
             }
         }
         self.note_waiting_runs(&view);
-        let is_kept = std::mem::take(&mut self.sync.keeps_cursor) && !is_other;
-        if is_kept {
-            // A server that was restarted may have lost the last move of the cursor: send it again.
+        let keeps_cursor = std::mem::take(&mut self.sync.keeps_cursor) && !is_other;
+        if keeps_cursor {
+            // A restarted server may have lost the last move of the cursor: send it again.
             self.sync.server_cursor = view.cursor;
         }
         if is_other || (!moved_meanwhile && self.is_moved_elsewhere(view.cursor)) {
-            self.go_where_the_server_is(view.cursor);
+            self.adopt_server_cursor(view.cursor);
         }
         self.sync.linked = Some(view.id.clone());
         self.session = Some(view);
@@ -272,7 +274,7 @@ impl State {
         self.keep_cursor_valid();
     }
 
-    /// Moves the cursor off a target or run that is no more.
+    /// Moves the cursor off a target or run that no longer exists.
     pub(crate) fn keep_cursor_valid(&mut self) {
         let Some(session) = &self.session else { return };
         if self.target().is_none() {
@@ -293,7 +295,7 @@ impl State {
         self.cursor.target = Some(target);
         self.cursor.run = 0;
         self.draft.clear();
-        self.did(Deed::Picked { target });
+        self.record_change(UndoableChange::Picked { target });
         self.keep_cursor_valid();
         if let Some(target) = self.target() {
             let step = target.designation.step;
@@ -307,7 +309,7 @@ impl State {
         }
     }
 
-    pub(super) fn took_run(&mut self, target: usize, run: RunView) {
+    pub(super) fn on_run_reply(&mut self, target: usize, run: RunView) {
         self.sync.session_stale = true;
         let number = run.number;
         let of_target = self.session.as_mut().and_then(|s| s.targets.iter_mut().find(|t| t.number == target));
@@ -318,12 +320,12 @@ impl State {
         self.cursor = Cursor { target: Some(target), run: number, ..self.cursor };
         self.draft.clear();
         self.end_trial();
-        self.did(Deed::Branched { target, run: number });
+        self.record_change(UndoableChange::Branched { target, run: number });
         self.messages.note_of_session(format!("Run {} goes on from here.", run_letter(number)));
     }
 }
 
-/// The text with a capital letter.
+/// The text with its first letter capitalised.
 fn with_capital(text: &str) -> String {
     let mut letters = text.chars();
     let first = letters.next().map(|letter| letter.to_uppercase().to_string()).unwrap_or_default();

@@ -1,4 +1,4 @@
-//! What every part of the panel “Shape” is given, and what it says where it has no data.
+//! The context shared by the parts of the panel “Shape”, and the text of a part without data.
 
 use egui::Ui;
 use sightline_session::step::RunStep;
@@ -8,23 +8,23 @@ use crate::cache::Slot;
 use crate::panels;
 use crate::state::State;
 
-/// What a part of the panel is given.
+/// The context of a part.
 #[derive(Clone, Copy)]
-pub(super) struct Look<'a> {
+pub(super) struct PartContext<'a> {
     pub(super) state: &'a State,
     pub(super) trace: &'a RunStep,
     pub(super) evidence: &'a ShapeEvidence,
 }
 
 /// Why a part of this step has no data.
-pub(super) fn why_not(look: &Look<'_>, what: &str) -> String {
-    let evidence = look.evidence;
+pub(super) fn why_not(context: &PartContext<'_>, what: &str) -> String {
+    let evidence = context.evidence;
     let reason = evidence.registration.as_ref().and_then(|found| found.reason.as_ref());
     let why = reason.or(evidence.missing.as_ref()).unwrap_or(&evidence.why);
-    format!("No {what} at step {}: {why}.", look.trace.step)
+    format!("No {what} at step {}: {why}.", context.trace.step)
 }
 
-/// What is in a slot; a sentence on the screen where it is not there.
+/// The item in a slot; if it is not loaded, shows a sentence and returns `None`.
 pub(super) fn ready<'a, T>(ui: &mut Ui, slot: Slot<'a, T>, what: &str) -> Option<&'a T> {
     match slot {
         Slot::Ready(item) => return Some(item),

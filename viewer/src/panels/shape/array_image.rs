@@ -1,6 +1,6 @@
-//! An array as a picture with its title, its colour bar with unit and limits, and the value under the pointer.
+//! An array as an image with its title, its colour bar with unit and limits, and the value under the pointer.
 //!
-//! A value that does not exist is a checker. The colours end where one value in a hundred lies beyond; the bar says so.
+//! Missing values are shown as a checker. The ends of the colour bar are marked ≤ and ≥, because values may lie beyond.
 
 use egui::{Align2, Painter, Pos2, Rect, Response, Sense, Stroke, StrokeKind, Ui, Vec2, pos2, vec2};
 
@@ -12,27 +12,27 @@ use crate::theme;
 
 /// Width of the colour bar with its numbers, points.
 pub(crate) const BAR: f32 = 70.0;
-/// The least that a picture takes, points.
+/// Minimum width and height of an image with its bar, points.
 const LEAST: f32 = 110.0;
 /// Height of the title, points.
 const TITLE: f32 = 16.0;
 
-/// How values are said: so many of the unit one of theirs is.
+/// The display unit of values.
 #[derive(Clone, Copy)]
-pub(crate) struct Unit {
-    /// The unit.
+pub(crate) struct DisplayUnit {
+    /// The name of the unit.
     pub(crate) word: &'static str,
-    /// How many of it one of the array's is.
+    /// Number of display units in one unit of the array.
     pub(crate) factor: f32,
 }
 
-impl Unit {
-    /// A value with the unit.
-    pub(crate) fn say(self, value: f32) -> String {
+impl DisplayUnit {
+    /// A value with its unit.
+    pub(crate) fn format(self, value: f32) -> String {
         format!("{} {}", self.number(value), self.word)
     }
 
-    /// A value in the unit, to three digits: a colour tells no more.
+    /// A value in the display unit, to three digits, which is the precision of a colour.
     pub(crate) fn number(self, value: f32) -> String {
         let value = f64::from(value * self.factor);
         let decimals = match value.abs() {
@@ -42,40 +42,40 @@ impl Unit {
             _ => 0,
         };
         let digits = format!("{value:.decimals$}");
-        // What rounds to zero has no sign.
+        // Zero after rounding has no sign.
         if digits.trim_matches(['-', '0', '.']).is_empty() { "0".to_owned() } else { digits }
     }
 }
 
-/// An array and how it is shown.
-pub(crate) struct Picture<'a> {
-    /// What it is.
+/// An array and its presentation.
+pub(crate) struct ArrayImage<'a> {
+    /// The title above the image.
     pub(crate) title: &'a str,
     /// The values.
     pub(crate) raster: &'a Raster,
-    /// How they are coloured; none: in grey, without a bar.
-    pub(crate) look: Option<raster::Look>,
-    /// Their unit.
-    pub(crate) unit: Unit,
+    /// The colour map; `None`: grey, without a bar.
+    pub(crate) colour_map: Option<raster::ColourMap>,
+    /// The unit of the values.
+    pub(crate) unit: DisplayUnit,
 }
 
-/// A picture that was laid out.
+/// An image after layout.
 pub(crate) struct Placed {
-    /// Where its pixels are on the screen.
+    /// The screen area of its pixels.
     pub(crate) area: Rect,
-    /// Pointer and words.
+    /// The response of the image and its title.
     pub(crate) response: Response,
     painter: Painter,
     scale: f32,
 }
 
 impl Placed {
-    /// Where a place of the array is on the screen; (0, 0) is the middle of its first pixel.
+    /// The screen position of an array position; (0, 0) is the centre of the first pixel.
     pub(crate) fn to_screen(&self, x: f64, y: f64) -> Pos2 {
         self.area.min + vec2(x as f32 + 0.5, y as f32 + 0.5) * self.scale
     }
 
-    /// A mark at a place of the array; nothing outside of it.
+    /// A mark at an array position; nothing outside the image.
     pub(crate) fn mark(&self, x: f64, y: f64, mark: Mark, colour: egui::Color32) {
         let at = self.to_screen(x, y);
         if self.area.contains(at) {
@@ -84,10 +84,10 @@ impl Placed {
     }
 }
 
-impl Picture<'_> {
-    /// Shows the picture in an area of this size.
+impl ArrayImage<'_> {
+    /// Shows the image in an area of this size.
     pub(crate) fn show(&self, ui: &mut Ui, size: Vec2) -> Placed {
-        let bar = if self.look.is_some() { BAR } else { 0.0 };
+        let bar = if self.colour_map.is_some() { BAR } else { 0.0 };
         let [width, height] = self.raster.size().map(|side| side.max(1) as f32);
         let scale = ((size.x - bar) / width).min((size.y - TITLE - 2.0) / height).max(0.01);
         let taken = vec2(size.x, TITLE + height * scale + 2.0);
@@ -96,10 +96,10 @@ impl Picture<'_> {
         painter.text(rect.min, Align2::LEFT_TOP, self.title, theme::image_font(), theme::text());
         let area = Rect::from_min_size(rect.min + vec2(0.0, TITLE), vec2(width, height) * scale);
         view2d::checker(&painter, area);
-        if let Some(look) = self.look {
-            self.raster.look(look);
+        if let Some(colour_map) = self.colour_map {
+            self.raster.set_colour_map(colour_map);
             let beside = Rect::from_min_size(area.right_top() + vec2(5.0, 0.0), vec2(BAR, area.height()));
-            colour_bar(&painter, beside, look, self.unit);
+            colour_bar(&painter, beside, colour_map, self.unit);
         }
         let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
         painter.image(self.raster.texture.id(), area, whole, theme::UNTINTED);
@@ -112,32 +112,32 @@ impl Picture<'_> {
 
     /// Title and limits.
     fn words(&self) -> String {
-        let Some(look) = self.look else { return self.title.to_owned() };
-        let [low, high] = look.limits();
-        format!("{}, from {} to {}", self.title, self.unit.say(low), self.unit.say(high))
+        let Some(colour_map) = self.colour_map else { return self.title.to_owned() };
+        let [low, high] = colour_map.limits();
+        format!("{}, from {} to {}", self.title, self.unit.format(low), self.unit.format(high))
     }
 
-    /// Says the value under the pointer.
+    /// Shows the value under the pointer.
     fn hover(&self, placed: &Placed) {
         let Some(at) = placed.response.hover_pos().filter(|at| placed.area.contains(*at)) else { return };
         let [x, y] = ((at - placed.area.min) / placed.scale).into();
         let (x, y) = (x.floor() as i64, y.floor() as i64);
-        let value = self.raster.at(x, y).map_or_else(|| "no value here".to_owned(), |v| self.unit.say(v));
+        let value = self.raster.at(x, y).map_or_else(|| "no value here".to_owned(), |v| self.unit.format(v));
         placed.response.clone().on_hover_text_at_pointer(format!("column {x}, row {y}: {value}"));
     }
 }
 
-/// The colours with both ends and the middle in words.
-pub(crate) fn colour_bar(painter: &Painter, area: Rect, look: raster::Look, unit: Unit) {
+/// The colour bar with the values of its ends and middle.
+pub(crate) fn colour_bar(painter: &Painter, area: Rect, colour_map: raster::ColourMap, unit: DisplayUnit) {
     const STEPS: u16 = 48;
     let strip = Rect::from_min_max(area.min, pos2(area.left() + 10.0, area.bottom()));
-    let [low, high] = look.limits();
+    let [low, high] = colour_map.limits();
     let mut mesh = egui::Mesh::default();
     for step in 0..STEPS {
         let [from, to] = [step, step + 1].map(|step| f32::from(step) / f32::from(STEPS));
         let y = |share: f32| strip.bottom() - share * strip.height();
         let row = Rect::from_min_max(pos2(strip.left(), y(to)), pos2(strip.right(), y(from)));
-        mesh.add_colored_rect(row, look.colour(low + (high - low) * (from + to) / 2.0));
+        mesh.add_colored_rect(row, colour_map.colour(low + (high - low) * (from + to) / 2.0));
     }
     painter.add(egui::Shape::mesh(mesh));
     let middle = (low + high) / 2.0;
@@ -154,14 +154,14 @@ pub(crate) fn colour_bar(painter: &Painter, area: Rect, look: raster::Look, unit
     }
 }
 
-/// The most that each of `count` pictures side by side may take of the room there is, at most `height` points high.
+/// The maximum size of each of `count` images side by side in the available width, at most `height` points high.
 pub(crate) fn side_by_side(ui: &Ui, count: usize, height: f32) -> Vec2 {
     let gaps = ui.spacing().item_spacing.x * (count - 1) as f32;
     let width = ((ui.available_width() - gaps) / count as f32 - 1.0).max(LEAST);
     vec2(width, height.max(LEAST))
 }
 
-/// The longest side that a square picture with its bar has in an area of this size, points.
+/// The side of a square image with title and bar that fits into an area of this size, points.
 pub(crate) fn square(size: Vec2) -> f32 {
     (size.x - BAR).min(size.y - TITLE - 2.0)
 }

@@ -1,4 +1,4 @@
-//! The record of the cursor's step as a book that can be explained, with the poses of the open traverse.
+//! The record of the cursor's step with its context, as the explanations need it, and the poses of the open traverse.
 
 use sightline_api::wire::TraverseView;
 use sightline_geometry::frames::{Pose, PoseRecord};
@@ -31,8 +31,8 @@ impl State {
         self.traverse.as_ref().map(Poses)
     }
 
-    /// The cursor's step with the one before it.
-    pub(crate) fn book<'a>(&'a self, poses: &'a Poses<'a>) -> Option<Book<'a>> {
+    /// The cursor's step with the previous step.
+    pub(crate) fn step_context<'a>(&'a self, poses: &'a Poses<'a>) -> Option<Book<'a>> {
         let step = self.cursor.step;
         let run = self.run()?;
         let before = step.checked_sub(1).and_then(|before| self.trace_at(before).ready());
@@ -41,13 +41,16 @@ impl State {
         Some(Book { trace: self.trace()?, before, settings: &run.settings, prediction_px, sources: poses })
     }
 
-    /// Whether the record of the cursor's step is here and has this value.
+    /// Whether the record of the cursor's step is loaded and contains this value.
     pub(crate) fn has_value(&self, name: &str) -> bool {
         let poses = self.poses();
-        poses.as_ref().and_then(|poses| self.book(poses)).is_some_and(|book| book.ask(name).is_ok())
+        poses
+            .as_ref()
+            .and_then(|poses| self.step_context(poses))
+            .is_some_and(|context| context.ask(name).is_ok())
     }
 
-    /// The change of the estimated pose to the cursor's stop, and its error where the truth is known.
+    /// The change of the estimated pose to the cursor's stop, and its error if the ground truth is known.
     pub(crate) fn pose_change(&self) -> Option<(PoseChange, Option<[f64; 6]>)> {
         let traverse = self.traverse.as_ref()?;
         let step = self.cursor.step;
