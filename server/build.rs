@@ -1,5 +1,5 @@
-//! Hands the version of the program to the compiler: the package's, with the description of the commit by Git. Without a
-//! repository of its own, as in a source archive, a digest of the sources takes the place of the commit.
+//! Passes the program's version to the compiler: the package version with `git describe`. Without a repository of its own,
+//! as in a source archive, a digest of the sources replaces the commit.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -20,7 +20,8 @@ fn main() -> io::Result<()> {
     Ok(())
 }
 
-/// The commit as `git describe` names it, if the repository is the program's own; watches what changes the name.
+/// `git describe` of the commit, or `None` if the repository is not the program's own. Makes Cargo rerun the script when
+/// HEAD, the branch or a tag changes.
 fn described(package: &Path) -> Option<String> {
     let root = PathBuf::from(git(package, &["rev-parse", "--show-toplevel"])?).canonicalize().ok()?;
     if root != package.parent()?.canonicalize().ok()? {
@@ -37,7 +38,7 @@ fn described(package: &Path) -> Option<String> {
     git(package, &["describe", "--always", "--dirty", "--tags", "--abbrev=12"])
 }
 
-/// The output of a Git command, if there is a Git and a repository.
+/// Output of a Git command, or `None` without Git or a repository.
 fn git(folder: &Path, arguments: &[&str]) -> Option<String> {
     let output = Command::new("git").arg("-C").arg(folder).args(arguments).output().ok()?;
     let text = String::from_utf8(output.stdout).ok()?;

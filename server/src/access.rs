@@ -1,8 +1,8 @@
-//! The access token: who may use the server beyond loading the page.
+//! The access token, which every request except for the page itself needs.
 //!
-//! A request is let in with the token in `Authorization: Bearer`, as scripts send it, or in a cookie, because images,
-//! downloads and WebSockets of a browser cannot send a header. The page gets the cookie once, for the token in the
-//! fragment of the printed address: a fragment is never sent, so that neither logs nor referrers contain it.
+//! A request carries the token in `Authorization: Bearer` (scripts) or in a cookie, because images, downloads and WebSockets
+//! of a browser cannot send a header. The page gets the cookie once, in exchange for the token in the fragment of the
+//! printed address. Browsers never send fragments, so neither logs nor referrers contain the token.
 
 use std::fmt;
 use std::sync::Arc;
@@ -15,21 +15,21 @@ use crate::hosts::Hosts;
 use crate::problem::{ApiError, ApiResult};
 use crate::public_url::PublicUrl;
 
-/// Random bytes of a token: 128 bits.
+/// Random bytes in a token: 128 bits.
 const RANDOM_BYTES: usize = 16;
 
-/// The shortest and the longest token that a person may choose, characters.
+/// Minimum and maximum length of a chosen token, characters.
 const LENGTHS: std::ops::RangeInclusive<usize> = 16..=256;
 
-/// A secret that lets in whoever knows it.
+/// A shared secret that grants access.
 #[derive(Clone)]
 pub struct Token(Arc<str>);
 
 impl Token {
-    /// A token from the random numbers of the system.
+    /// Generates a token from the random numbers of the system.
     ///
     /// # Errors
-    /// [`Error::Request`] when the system has none.
+    /// [`Error::Request`] when the system provides none.
     pub(crate) fn random() -> Result<Self> {
         let mut bytes = [0_u8; RANDOM_BYTES];
         getrandom::fill(&mut bytes)
@@ -37,10 +37,10 @@ impl Token {
         Ok(Self(bytes.iter().map(|byte| format!("{byte:02x}")).collect::<String>().into()))
     }
 
-    /// A token that a person chose.
+    /// A token chosen by the user.
     ///
     /// # Errors
-    /// [`Error::Request`] for one that is too short, too long, or cannot be written into an address.
+    /// [`Error::Request`] for a token that is too short, too long, or contains characters that a URL would escape.
     pub fn chosen(text: &str) -> Result<Self> {
         let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || matches!(byte, b'-' | b'.' | b'_' | b'~');
         if LENGTHS.contains(&text.len()) && text.bytes().all(is_plain) {
@@ -52,12 +52,12 @@ impl Token {
         )))
     }
 
-    /// The secret itself, for the one who started the server.
+    /// The secret itself, to print for the user who starts the server.
     pub(crate) fn secret(&self) -> &str {
         &self.0
     }
 
-    /// Compares digests, so that the time tells nothing about how much of `given` is right.
+    /// Compares digests, so that the timing does not reveal how much of `given` is correct.
     fn is(&self, given: &str) -> bool {
         let [ours, theirs] = [self.0.as_bytes(), given.as_bytes()].map(Sha256::digest);
         ours.iter().zip(&theirs).fold(0, |differences, (a, b)| differences | (a ^ b)) == 0
@@ -70,7 +70,7 @@ impl fmt::Debug for Token {
     }
 }
 
-/// Under which names, and with which token, the server may be used.
+/// The host names and the token under which the server may be used.
 #[derive(Clone, Debug)]
 pub struct Access {
     hosts: Hosts,
@@ -79,33 +79,33 @@ pub struct Access {
 }
 
 impl Access {
-    /// Only with the token.
+    /// Access with the token only.
     pub const fn with_token(hosts: Hosts, token: Token) -> Self {
         Self { hosts, token: Some(token), public: None }
     }
 
-    /// For everybody who reaches the server under these names.
+    /// Access for every client that uses one of these host names.
     pub const fn without_token(hosts: Hosts) -> Self {
         Self { hosts, token: None, public: None }
     }
 
-    /// The same behind a reverse proxy that publishes the server at this address.
+    /// The same, behind a reverse proxy that publishes the server at `public`.
     #[must_use]
     pub fn behind_proxy(self, public: PublicUrl) -> Self {
         Self { hosts: self.hosts.and(public.authority()), public: Some(public), ..self }
     }
 
-    /// The address under which a reverse proxy publishes the server.
+    /// The address at which a reverse proxy publishes the server.
     pub(crate) const fn public(&self) -> Option<&PublicUrl> {
         self.public.as_ref()
     }
 
-    /// The names under which the server may be addressed.
+    /// The host names under which the server may be addressed.
     pub(crate) const fn hosts(&self) -> &Hosts {
         &self.hosts
     }
 
-    /// Lets a request in that has the token in its header or its cookie.
+    /// Accepts a request with the token in its header or cookie.
     ///
     /// # Errors
     /// A problem with status 401.
@@ -119,10 +119,10 @@ impl Access {
         if bearers.chain(cookies).any(|given| token.is(given)) { Ok(()) } else { Err(locked()) }
     }
 
-    /// The cookie for a page that knows the token; none where the server asks for no token.
+    /// The cookie for a page that sends the token; `None` if the server needs no token.
     ///
     /// # Errors
-    /// A problem with status 401 for another token.
+    /// A problem with status 401 for a wrong token.
     pub(crate) fn log_in(&self, given: &str) -> ApiResult<Option<String>> {
         match &self.token {
             None => Ok(None),
@@ -136,7 +136,7 @@ impl Access {
         }
     }
 
-    /// Browsers send a cookie to all ports of a host: each server needs a name of its own.
+    /// Browsers send a cookie to all ports of a host, so the name contains the port.
     fn cookie_name(&self) -> String {
         format!("sightline-{}", self.hosts.port())
     }

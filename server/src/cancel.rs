@@ -1,4 +1,4 @@
-//! Flags that end work: set by a person, when the request that waits for the work goes away, or after too long a time.
+//! Flags that cancel work: on request, when the HTTP request that waits for it is dropped, or after a deadline.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -7,15 +7,15 @@ use std::time::Duration;
 use tokio::runtime::Handle;
 use tokio::task::AbortHandle;
 
-/// Tells one computation to end.
+/// Cancels one computation when set.
 pub(crate) type CancelFlag = Arc<AtomicBool>;
 
-/// Cancels the work for a request that goes away.
+/// Cancels the work for a request when the request is dropped.
 #[derive(Default)]
 pub(crate) struct CancelOnDrop(CancelFlag);
 
 impl CancelOnDrop {
-    /// The flag that is set when the request goes away.
+    /// The flag that is set on drop.
     pub(crate) fn flag(&self) -> CancelFlag {
         Arc::clone(&self.0)
     }
@@ -27,14 +27,14 @@ impl Drop for CancelOnDrop {
     }
 }
 
-/// Sets a flag when some work has taken too long, unless it is dropped before.
+/// Sets a flag after a time limit, unless dropped before.
 pub(crate) struct Deadline {
     watch: Option<AbortHandle>,
     passed: CancelFlag,
 }
 
 impl Deadline {
-    /// Begins to count; without a limit the flag is never set.
+    /// Starts the clock; without a limit the flag is never set.
     pub(crate) fn begin(limit: Option<Duration>, flag: &CancelFlag) -> Self {
         let passed = CancelFlag::default();
         let (own, flag) = (Arc::clone(&passed), Arc::clone(flag));
@@ -49,7 +49,7 @@ impl Deadline {
         Self { watch, passed }
     }
 
-    /// Whether the work was told to end.
+    /// Whether the limit has passed.
     pub(crate) fn has_passed(&self) -> bool {
         self.passed.load(Ordering::Relaxed)
     }

@@ -1,6 +1,6 @@
-//! The clock by which the server stamps what it keeps.
+//! The clock for the time stamps of stored data.
 
-/// Now, to the millisecond: RFC 3339, UTC.
+/// The current time, to the millisecond: RFC 3339, UTC.
 pub(crate) fn now() -> String {
     let now = jiff::Timestamp::now();
     jiff::Timestamp::from_millisecond(now.as_millisecond()).unwrap_or(now).to_string()

@@ -1,6 +1,6 @@
 //! The rows of a run as CSV, the same for REST and the command line.
 //!
-//! Numbers are written with all their digits, so that reading them gives the same bits; what is not known is empty.
+//! Numbers are written with enough digits to restore the same bits; unknown values are empty.
 
 use sightline_api::table::cell as text_cell;
 use sightline_record::{Column, StageRecord, Value};
@@ -48,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_row_has_as_many_cells_as_the_header_and_keeps_every_digit() {
+    fn a_row_matches_the_header_and_has_full_precision() {
         let number = 0.1 + 0.2;
         let row = StepRow { step: 3, state: "tracking".to_owned(), ncc: Some(number), ..empty() };
         let line = csv_line(&row);

@@ -1,13 +1,13 @@
-//! The accept loop: how many connections are open, and how long each may take for its part.
+//! The accept loop: limits the number of open connections and the time of each request and answer.
 //!
 //! ```text
 //!             first byte … whole head        body sent
 //! waiting ─────────────────────────► busy ────────────► waiting
-//!    └─ closed after `header_s`, or earlier when a newcomer needs its place
+//!    └─ closed after `header_s`, or earlier when a new connection needs its slot
 //! ```
-//! A connection without a request in progress is *waiting*: it is idle, or dribbles the head of a request. At the limit, the one
-//! that has waited longest is closed for a newcomer; busy ones are never closed. So connections that send nothing
-//! lock nobody out. A client that takes nothing of an answer for `send_s` is cut off.
+//! A connection without a request in progress is *waiting*: it is idle, or sends the head of a request slowly. At the limit,
+//! the longest waiting one is closed for a new connection; busy ones are never closed. Connections that send nothing
+//! therefore cannot exhaust the server. A client that reads nothing of an answer for `send_s` is disconnected.
 
 use std::collections::HashMap;
 use std::convert::Infallible;
@@ -34,24 +34,24 @@ use tokio::time::Sleep;
 use crate::jobs::lock;
 use crate::limits::Limits;
 
-/// Descriptors that are left for files when the system allows few: databases, images, exports, Rerun.
+/// File descriptors reserved for databases, images, exports and Rerun if the system allows few.
 #[cfg(unix)]
-const DESCRIPTORS_LEFT: u64 = 96;
-/// The least number of connections, however few descriptors there are.
+const RESERVED_DESCRIPTORS: u64 = 96;
+/// Minimum number of connections, however few descriptors there are.
 #[cfg(unix)]
-const LEAST: usize = 16;
-/// Connections that may wait to be accepted: with the 128 of the standard library a newcomer waits for a second behind some
-/// hundred others, because the system drops its first packet.
+const MIN_CONNECTIONS: usize = 16;
+/// Length of the accept queue. With the 128 of the standard library, a new connection behind some hundred others is delayed
+/// by a second, because the system drops its first packet.
 #[cfg(unix)]
 const BACKLOG: i32 = 1024;
-/// How long accepting rests when the system refuses, for example because all descriptors are in use.
-const REST: Duration = Duration::from_millis(50);
+/// How long accepting pauses after an error of the system, for example when all descriptors are in use.
+const ACCEPT_PAUSE: Duration = Duration::from_millis(50);
 
 /// The open connections of a server.
 #[derive(Debug, Default)]
 pub(crate) struct Connections {
     open: Mutex<Open>,
-    /// Told when a connection leaves or begins to wait.
+    /// Notified when a connection closes or starts to wait.
     changed: Notify,
 }
 
@@ -64,37 +64,37 @@ struct Open {
 /// A connection.
 #[derive(Debug)]
 struct State {
-    /// Since when it has waited for a request; `None` while it has one.
+    /// When it started to wait for a request; `None` during one.
     waiting: Option<Instant>,
-    /// How to close it; `None` once that was done.
+    /// Closes the connection; `None` once used.
     close: Option<AbortHandle>,
-    /// Whether it answers no requests any more.
+    /// Whether it was upgraded to a WebSocket and answers no more requests.
     is_web_socket: bool,
 }
 
 impl State {
-    /// Whether it may be closed for a newcomer.
+    /// Whether it may be closed for a new connection.
     fn is_idle(&self) -> bool {
         self.waiting.is_some() && self.close.is_some() && !self.is_web_socket
     }
 }
 
 impl Connections {
-    /// How many are open.
+    /// Number of open connections.
     pub(crate) fn count(&self) -> usize {
         lock(&self.open).by_number.len()
     }
 
-    fn enter(self: &Arc<Self>) -> Arc<Place> {
+    fn enter(self: &Arc<Self>) -> Arc<ConnectionSlot> {
         let mut open = lock(&self.open);
         open.last_number += 1;
         let number = open.last_number;
         open.by_number
             .insert(number, State { waiting: Some(Instant::now()), close: None, is_web_socket: false });
-        Arc::new(Place { connections: Arc::clone(self), number })
+        Arc::new(ConnectionSlot { connections: Arc::clone(self), number })
     }
 
-    /// Waits until there are fewer connections than `limit`, and closes waiting ones for it.
+    /// Waits until there are fewer connections than `limit`, closing waiting ones.
     async fn make_room(&self, limit: usize) {
         while self.count() >= limit {
             self.close_longest_waiting();
@@ -118,28 +118,28 @@ impl Connections {
     }
 }
 
-/// One of the open connections, until its stream is closed.
+/// One open connection, until its stream is closed.
 #[derive(Debug)]
-struct Place {
+struct ConnectionSlot {
     connections: Arc<Connections>,
     number: u64,
 }
 
-impl Drop for Place {
+impl Drop for ConnectionSlot {
     fn drop(&mut self) {
         lock(&self.connections.open).by_number.remove(&self.number);
         self.connections.changed.notify_one();
     }
 }
 
-/// A request in progress, until its answer was handed over.
+/// A request in progress, until its answer is complete.
 #[derive(Debug)]
-struct Busy(Arc<Place>);
+struct Busy(Arc<ConnectionSlot>);
 
 impl Busy {
-    fn new(place: &Arc<Place>) -> Self {
-        place.connections.set(place.number, |state| state.waiting = None);
-        Self(Arc::clone(place))
+    fn new(slot: &Arc<ConnectionSlot>) -> Self {
+        slot.connections.set(slot.number, |state| state.waiting = None);
+        Self(Arc::clone(slot))
     }
 }
 
@@ -149,27 +149,27 @@ impl Drop for Busy {
     }
 }
 
-/// How many connections there may be: the limit, or fewer where the system allows too few descriptors.
-fn most(limits: &Limits) -> usize {
-    let wanted = limits.connections.count();
+/// Maximum number of connections: the limit, or fewer if the system allows too few descriptors.
+fn connection_limit(limits: &Limits) -> usize {
+    let configured = limits.connections.count();
     #[cfg(unix)]
     {
         let allowed = rustix::process::getrlimit(rustix::process::Resource::Nofile).current;
-        let room = allowed.map_or(u64::MAX, |descriptors| descriptors.saturating_sub(DESCRIPTORS_LEFT));
-        wanted.min(usize::try_from(room).unwrap_or(usize::MAX).max(LEAST))
+        let room = allowed.map_or(u64::MAX, |descriptors| descriptors.saturating_sub(RESERVED_DESCRIPTORS));
+        configured.min(usize::try_from(room).unwrap_or(usize::MAX).max(MIN_CONNECTIONS))
     }
     #[cfg(not(unix))]
-    wanted
+    configured
 }
 
-/// Accepts connections and answers their requests, for ever.
+/// Accepts connections and answers their requests, forever.
 pub(crate) async fn serve(
     listener: TcpListener,
     app: Router,
     limits: &Limits,
     connections: Arc<Connections>,
 ) -> Infallible {
-    let limit = most(limits);
+    let limit = connection_limit(limits);
     #[cfg(unix)]
     if let Err(error) = rustix::net::listen(&listener, BACKLOG) {
         tracing::warn!("few connections can wait to be accepted: {error}");
@@ -181,19 +181,19 @@ pub(crate) async fn serve(
             Err(error) => {
                 tracing::error!("cannot accept a connection: {error}");
                 connections.close_longest_waiting();
-                tokio::time::sleep(REST).await;
+                tokio::time::sleep(ACCEPT_PAUSE).await;
                 continue;
             }
         };
         connections.make_room(limit).await;
-        let place = connections.enter();
-        let work = answer(stream, app.clone(), limits, &place);
+        let slot = connections.enter();
+        let work = answer(stream, app.clone(), limits, &slot);
         let close = tokio::spawn(work).abort_handle();
-        connections.set(place.number, |state| state.close = Some(close));
+        connections.set(slot.number, |state| state.close = Some(close));
     }
 }
 
-/// Whether an error of `accept` says no more than that a client went away.
+/// Whether an error of `accept` only means that the client disconnected.
 fn is_of_client(error: &io::Error) -> bool {
     use io::ErrorKind::{ConnectionAborted, ConnectionRefused, ConnectionReset};
     matches!(error.kind(), ConnectionAborted | ConnectionRefused | ConnectionReset)
@@ -204,28 +204,29 @@ fn answer(
     stream: TcpStream,
     app: Router,
     limits: &Limits,
-    place: &Arc<Place>,
+    slot: &Arc<ConnectionSlot>,
 ) -> impl Future<Output = ()> + Send + 'static {
     let mut http = http1::Builder::new();
     http.timer(TokioTimer::new()).header_read_timeout(limits.header_s.time());
-    let patience = limits.send_s.time();
-    let stream = TokioIo::new(Patient { stream, patience, stalled: None, _place: Arc::clone(place) });
-    let (app, place) = (TowerToHyperService::new(app), Arc::clone(place));
-    let (connections, number) = (Arc::clone(&place.connections), place.number);
+    let write_timeout = limits.send_s.time();
+    let stream =
+        TokioIo::new(WriteTimeoutStream { stream, write_timeout, stalled: None, _slot: Arc::clone(slot) });
+    let (app, slot) = (TowerToHyperService::new(app), Arc::clone(slot));
+    let (connections, number) = (Arc::clone(&slot.connections), slot.number);
     let service = service_fn(move |request: Request<Incoming>| {
-        let busy = Busy::new(&place);
+        let busy = Busy::new(&slot);
         let answer = app.call(request);
         async move { answer.await.map(|answer| answer.map(|body| Body::new(Sending { body, _busy: busy }))) }
     });
     async move {
-        // A client that goes away or is too slow is no fault of the program.
+        // A client that disconnects or is too slow is not an error of the program.
         let _ = http.serve_connection(stream, service).with_upgrades().await;
-        // Where the stream lives on, it is a WebSocket, which waits for no request.
+        // If the stream is still open, it is a WebSocket, which waits for no request.
         connections.set(number, |state| state.is_web_socket = true);
     }
 }
 
-/// The body of an answer, which keeps its connection busy.
+/// The body of an answer, which keeps its connection busy until it is sent.
 struct Sending {
     body: Body,
     _busy: Busy,
@@ -251,17 +252,17 @@ impl hyper::body::Body for Sending {
     }
 }
 
-/// A stream whose client must take what is sent to it.
-struct Patient {
+/// A stream that fails if its client does not read.
+struct WriteTimeoutStream {
     stream: TcpStream,
-    patience: Option<Duration>,
-    /// Runs while the client takes nothing.
+    write_timeout: Option<Duration>,
+    /// The timeout, running while the client reads nothing.
     stalled: Option<Pin<Box<Sleep>>>,
-    _place: Arc<Place>,
+    _slot: Arc<ConnectionSlot>,
 }
 
-impl Patient {
-    /// Passes on how a write went, and fails once it has waited too long.
+impl WriteTimeoutStream {
+    /// Passes on the result of a write, or fails once writing has stalled too long.
     fn watch(
         &mut self,
         written: Poll<io::Result<usize>>,
@@ -271,14 +272,14 @@ impl Patient {
             self.stalled = None;
             return written;
         }
-        let Some(patience) = self.patience else { return written };
-        let stalled = self.stalled.get_or_insert_with(|| Box::pin(tokio::time::sleep(patience)));
+        let Some(write_timeout) = self.write_timeout else { return written };
+        let stalled = self.stalled.get_or_insert_with(|| Box::pin(tokio::time::sleep(write_timeout)));
         ready!(stalled.as_mut().poll(context));
         Poll::Ready(Err(io::ErrorKind::TimedOut.into()))
     }
 }
 
-impl AsyncRead for Patient {
+impl AsyncRead for WriteTimeoutStream {
     fn poll_read(
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,
@@ -288,7 +289,7 @@ impl AsyncRead for Patient {
     }
 }
 
-impl AsyncWrite for Patient {
+impl AsyncWrite for WriteTimeoutStream {
     fn poll_write(
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,

@@ -1,4 +1,4 @@
-//! The simulated drives that were opened: their folders, their scenarios, and opening them again after a restart.
+//! The simulated drives opened so far: their folders, their scenarios, and reopening them after a restart.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -17,7 +17,7 @@ use crate::naming::{hash, slug};
 use crate::rendering::OpenTraverse;
 use crate::store::Store;
 
-/// The name of the folder of a scenario's drive: the same scenario always has the same, so that images are rendered once.
+/// The folder name of a scenario's drive. It depends only on the scenario, so that images are rendered once.
 pub(crate) fn folder_name(scenario: &Scenario) -> String {
     format!("{}-{}", slug(&scenario.name), &hash(scenario.to_toml().as_bytes())[..12])
 }
@@ -29,13 +29,13 @@ pub(crate) fn scenario_of(traverse: &Traverse) -> Option<Scenario> {
     Scenario::from_toml(&text, &path).ok()
 }
 
-/// The name in the library of this very scenario.
+/// The name of an identical scenario in the library.
 pub(crate) fn library_name(scenario: &Scenario) -> Option<&'static str> {
     let text = scenario.to_toml();
     library::names().find(|name| library::scenario(name).is_ok_and(|known| known.to_toml() == text))
 }
 
-/// What opens the traverse on this machine's command line: a name of the library, or its folder.
+/// The command-line argument that opens the traverse on this machine: a library name, or the folder.
 pub(crate) fn argument(traverse: &Traverse) -> String {
     let named = scenario_of(traverse).as_ref().and_then(library_name);
     let folder = traverse.folder();
@@ -43,11 +43,11 @@ pub(crate) fn argument(traverse: &Traverse) -> String {
     named.map_or_else(|| folder().display().to_string(), str::to_owned)
 }
 
-/// The drives that the server was given, each once, and a notice for each that is the same as another.
+/// The drives passed to the server without duplicates, and a notice for each duplicate.
 ///
 /// # Errors
-/// An index that cannot be named.
-pub(crate) fn open_given(
+/// An index that cannot be serialised for its name.
+pub(crate) fn open_initial(
     traverses: Vec<Traverse>,
     folders: &Folders,
     events: &broadcast::Sender<Event>,
@@ -69,11 +69,11 @@ pub(crate) fn open_given(
     Ok((open, notices))
 }
 
-/// Opens the drives that were opened from pages before; what cannot be opened is said in one sentence each.
+/// Reopens the drives that were opened from pages; returns one sentence for each that cannot be opened.
 ///
 /// # Errors
-/// A database that cannot be read, or an index that cannot be named.
-pub(crate) fn open_again(
+/// A database that cannot be read, or an index that cannot be serialised for its name.
+pub(crate) fn reopen(
     store: &Store,
     folders: &Folders,
     cache: &Arc<Cache>,
@@ -86,7 +86,7 @@ pub(crate) fn open_again(
         });
         (name, made)
     };
-    // Reading a long index takes most of a second; all processors read.
+    // Reading a long index takes almost a second, so the indexes are read in parallel.
     let all: Vec<_> = store.drives()?.into_par_iter().map(make).collect();
     let mut lost = Vec::new();
     for (name, made) in all {
@@ -94,7 +94,7 @@ pub(crate) fn open_again(
             Ok(traverse) => {
                 let identity = Identity::of(&traverse, None)?;
                 let id = identity.id();
-                // A drive that was given as well is no surprise.
+                // Not an error: the drive was also given on the command line.
                 if open.iter().all(|other| other.id != id) {
                     let traverse = traverse.with_cache(cache);
                     open.push(Arc::new(OpenTraverse::new(identity, traverse, events.clone())));

@@ -1,4 +1,4 @@
-//! How requests are read: names in paths, query parameters and JSON bodies, with problems that say what is wrong.
+//! Extractors for names in paths, query parameters and JSON bodies, whose problems name the offending field.
 
 use std::any::TypeId;
 use std::sync::Arc;
@@ -21,7 +21,7 @@ use crate::problem::{ApiError, ApiResult};
 use crate::recorded_step::RecordedStep;
 use crate::state::AppState;
 
-/// The names in the path of an endpoint; what is not even of their form does not exist.
+/// The names in the path of an endpoint; malformed names are reported as not found.
 pub(crate) struct Path<E: Endpoint>(pub E::At);
 
 impl<E: Endpoint, S: Send + Sync> FromRequestParts<S> for Path<E> {
@@ -43,7 +43,7 @@ async fn names<T: DeserializeOwned + Send, S: Send + Sync>(parts: &mut Parts, st
     }
 }
 
-/// The session that the path names.
+/// The session named in the path.
 pub(crate) struct SessionPath(pub Arc<LiveSession>);
 
 impl FromRequestParts<AppState> for SessionPath {
@@ -55,11 +55,11 @@ impl FromRequestParts<AppState> for SessionPath {
     }
 }
 
-/// The session that the path names, and the number of one of its targets.
+/// The session named in the path, and the index of one of its targets.
 pub(crate) struct TargetPath {
     /// The session.
     pub live: Arc<LiveSession>,
-    /// The target's number; whether it exists is for the handler to say.
+    /// The target's index; the handler checks that it exists.
     pub target: usize,
 }
 
@@ -72,13 +72,13 @@ impl FromRequestParts<AppState> for TargetPath {
     }
 }
 
-/// The session that the path names, and the numbers of one of its runs.
+/// The session named in the path, and the indices of one of its runs.
 pub(crate) struct RunPath {
     /// The session.
     pub live: Arc<LiveSession>,
-    /// The target's number.
+    /// The target's index.
     pub target: usize,
-    /// The run's number; whether it exists is for `with_run` or the handler to say.
+    /// The run's index; `with_run` or the handler checks that it exists.
     pub run: usize,
 }
 
@@ -92,10 +92,10 @@ impl FromRequestParts<AppState> for RunPath {
 }
 
 impl RunPath {
-    /// Reads the run; keep it short.
+    /// Reads the run while the session is locked; `read` must be quick.
     ///
     /// # Errors
-    /// A problem when there is no such run.
+    /// A problem if the run does not exist.
     pub(crate) fn with_run<T>(&self, read: impl FnOnce(&Session, &Run) -> T) -> ApiResult<T> {
         let found =
             self.live.with(|session| session.run(self.target, self.run).map(|run| read(session, run)));
@@ -111,7 +111,7 @@ impl FromRequestParts<AppState> for RecordedStep {
     }
 }
 
-/// The query parameters of an endpoint; unknown ones are refused by types that deny unknown fields.
+/// The query parameters of an endpoint; types that deny unknown fields reject unknown ones.
 pub(crate) struct Params<E: Endpoint>(pub E::Query);
 
 impl<E: Endpoint, S: Send + Sync> FromRequestParts<S> for Params<E> {
@@ -142,7 +142,7 @@ impl<E: Endpoint, S: Send + Sync> FromRequest<S> for Body<E> {
 /// The bytes of a body.
 ///
 /// # Errors
-/// A problem when it is too large, or does not arrive in time.
+/// A problem if the body is too large or does not arrive in time.
 pub(crate) async fn whole_body<S: Send + Sync>(mut request: Request, state: &S) -> ApiResult<Bytes> {
     let limits = request.extensions().get::<SharedLimits>().cloned().unwrap_or_default();
     let is_file = request.uri().path().ends_with(BringSession::PATH);
@@ -151,7 +151,7 @@ pub(crate) async fn whole_body<S: Send + Sync>(mut request: Request, state: &S) 
         let detail = format!("The body of this request may have at most {} bytes.", limit.count());
         ApiError::new(StatusCode::PAYLOAD_TOO_LARGE, "too_large", detail).hint(limit.raise())
     };
-    // Nobody waits for bytes that are announced and not wanted.
+    // Rejects an announced body that is too large without waiting for it.
     let announced = request.headers().get(header::CONTENT_LENGTH).and_then(|length| length.to_str().ok());
     if announced.and_then(|length| length.parse::<u64>().ok()).is_some_and(|n| n > limit.count() as u64) {
         return Err(too_large());
@@ -169,9 +169,9 @@ pub(crate) async fn whole_body<S: Send + Sync>(mut request: Request, state: &S) 
     })
 }
 
-/// Reads JSON: what is no JSON is a bad request; what does not fit is refused by the name of the field.
+/// Parses JSON: a syntax error is a bad request; other errors name the field.
 fn parse<T: DeserializeOwned + 'static>(bytes: &[u8]) -> ApiResult<T> {
-    // serde takes an array for a struct, too; the fields of a request have names.
+    // serde also accepts an array for a struct, but the fields of a request have names.
     let is_any = TypeId::of::<T>() == TypeId::of::<serde_json::Value>();
     if !is_any
         && bytes.trim_ascii_start().starts_with(b"[")
@@ -188,26 +188,26 @@ fn parse<T: DeserializeOwned + 'static>(bytes: &[u8]) -> ApiResult<T> {
         if !is_json {
             return malformed(wrong.inner());
         }
-        // An array that is too long is the only JSON that serde_json takes for a mistake of syntax.
+        // For valid JSON, serde_json reports a syntax error only if an array is too long.
         let message = if wrong.inner().is_data() {
             wrong.inner().to_string()
         } else {
             "has too many elements".to_owned()
         };
         let field = wrong.path().to_string();
-        // serde_json puts the place behind the message, which says less than the field.
+        // Removes the line and column that serde_json appends, because the field is more helpful.
         let message = message.split(" at line ").next().unwrap_or_default();
-        let place = if matches!(field.as_str(), "." | "?") { String::new() } else { format!("{field}: ") };
-        ApiError::invalid("field", format!("{place}{message}"))
+        let prefix = if matches!(field.as_str(), "." | "?") { String::new() } else { format!("{field}: ") };
+        ApiError::invalid("field", format!("{prefix}{message}"))
     })?;
     json.end().map_err(|wrong| malformed(&wrong))?;
     Ok(value)
 }
 
-/// The paths whose bodies are files.
+/// The path prefix of endpoints whose bodies are files.
 const UPLOADS: &str = "/api/v1/uploads/";
 
-/// Refuses bodies that are not JSON, or not bytes where files are sent, so that a form on a foreign page cannot reach a route.
+/// Requires bodies to be JSON, or bytes for uploads, so that a form on another site's page cannot reach a route.
 pub(crate) fn check_content_type(method: &Method, path: &str, headers: &HeaderMap) -> ApiResult<()> {
     if method.is_safe() {
         return Ok(());

@@ -1,7 +1,7 @@
 //! The first start without a traverse: a simulated drive of sixty short stops, with a target that is tracked and then lost.
 //!
-//! The drive is the library's scenario [`library::FIRST`], the target the one that its rule chooses, the configuration the default:
-//! what becomes of it is computed, not told. The session is begun once; a person who changes or empties it finds it so again.
+//! The drive is the library's scenario [`library::FIRST`], the target is chosen by its rule, and the configuration is the
+//! default; the outcome is computed live. The session is created once; changes by the user persist.
 
 use std::sync::Arc;
 
@@ -17,10 +17,10 @@ use crate::problem::ApiResult;
 use crate::runner;
 use crate::state::AppState;
 
-/// What its target is called.
+/// The label of the target.
 const LABEL: &str = "first target";
 
-/// The scenario with which a new user begins.
+/// The scenario for a first start.
 ///
 /// # Errors
 /// As [`library::scenario`].
@@ -28,10 +28,10 @@ pub fn scenario() -> Result<Scenario> {
     library::scenario(library::FIRST)
 }
 
-/// Begins the session of the first traverse, if it has none: its target is designated in the background and its run follows.
+/// Creates the session of the first traverse, if it has none; designates its target and starts its run in the background.
 ///
 /// # Errors
-/// A session that cannot be written, or too much waiting already.
+/// A session that cannot be written, or a full queue.
 pub fn begin(state: &AppState, scenario: &Scenario) -> ApiResult<()> {
     let Some(open) = state.traverses().first().cloned() else { return Ok(()) };
     if state.sessions().iter().any(|live| live.traverse().id == open.id) {
@@ -41,7 +41,7 @@ pub fn begin(state: &AppState, scenario: &Scenario) -> ApiResult<()> {
     let (own, scenario) = (state.clone(), scenario.clone());
     state.jobs().submit(move || {
         if let Err(error) = designate(&own, &live, &scenario) {
-            // The drive is there without a target; the page says how to pick one.
+            // The drive is available without a target; the page explains how to designate one.
             tracing::warn!(
                 "the first target cannot be designated: {}",
                 crate::printable::printable(&error.to_string())
@@ -50,7 +50,7 @@ pub fn begin(state: &AppState, scenario: &Scenario) -> ApiResult<()> {
     })
 }
 
-/// Designates the target that the scenario's rule chooses, and begins its run.
+/// Designates the target chosen by the scenario's rule, and starts its run.
 fn designate(state: &AppState, live: &Arc<LiveSession>, scenario: &Scenario) -> Result<()> {
     let open = live.traverse();
     let traverse = &open.traverse;

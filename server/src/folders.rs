@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use sightline_recordings::files::remove_left_overs;
 
-/// Where the server keeps what it makes.
+/// The folders with the server's data.
 #[derive(Clone, Debug)]
 pub(crate) struct Folders {
     /// Sessions.
@@ -14,22 +14,22 @@ pub(crate) struct Folders {
     pub studies: PathBuf,
     /// Simulated traverses.
     pub traverses: PathBuf,
-    /// Drives on commands.
-    pub driven: PathBuf,
-    /// Recordings that were imported from pages, and references to those that are opened in place.
+    /// Commanded drives.
+    pub commanded_drives: PathBuf,
+    /// Recordings imported from pages, and references to those opened in place.
     pub imported: PathBuf,
-    /// Recordings that pages send, until they are imported; emptied at each start.
+    /// Recordings uploaded by pages, until they are imported; emptied at each start.
     pub uploads: PathBuf,
-    /// Digests of the files of recorded traverses, from which nothing but time is lost when it is removed.
+    /// Digests of the files of recorded traverses; a cache that can be removed at any time.
     pub digests: PathBuf,
-    /// The folders below which pages may open recordings; canonical, and not the server's own.
+    /// The folders below which pages may open recordings; canonical paths, outside the server's own folders.
     pub recordings: Vec<PathBuf>,
 }
 
 impl Folders {
-    /// Sessions in `folder` itself, the rest in folders below it.
+    /// Sessions in `folder` itself, the others in subfolders.
     pub(crate) fn in_one(folder: &Path) -> Self {
-        let [studies, traverses, driven, imported, uploads, digests] =
+        let [studies, traverses, commanded_drives, imported, uploads, digests] =
             ["studies", "traverses", "driven", "imported", "uploads", "digests"]
                 .map(|name| folder.join(name));
         let recordings = Vec::new();
@@ -37,7 +37,7 @@ impl Folders {
             sessions: folder.to_owned(),
             studies,
             traverses,
-            driven,
+            commanded_drives,
             imported,
             uploads,
             digests,
@@ -45,10 +45,10 @@ impl Folders {
         }
     }
 
-    /// The same folders, with those below which pages may open recordings.
+    /// Sets the folders below which pages may open recordings.
     ///
     /// # Errors
-    /// What is no folder.
+    /// A path that is not a folder.
     pub(crate) fn with_recordings(self, recordings: &[PathBuf]) -> sightline_geometry::error::Result<Self> {
         let real = |path: &PathBuf| {
             let real = path.canonicalize().ok().filter(|real| real.is_dir());
@@ -61,16 +61,22 @@ impl Folders {
         Ok(Self { recordings, ..self })
     }
 
-    /// Makes the folders beside that of the sessions, for the owner alone, and begins to remove what a killed server left in
-    /// them. They may hold a hundred thousand images, so that nobody waits for it.
+    /// Creates all folders except that of the sessions, accessible to the owner only, and starts to remove remains of a
+    /// killed server from them. This runs in the background, because they may contain a hundred thousand images.
     ///
     /// # Errors
-    /// Those of the system.
+    /// Errors of the system.
     pub(crate) fn prepare(&self) -> Result<()> {
-        let folders =
-            [&self.studies, &self.traverses, &self.driven, &self.imported, &self.uploads, &self.digests];
+        let folders = [
+            &self.studies,
+            &self.traverses,
+            &self.commanded_drives,
+            &self.imported,
+            &self.uploads,
+            &self.digests,
+        ];
         let folders = folders.map(PathBuf::clone);
-        // Nobody sends the rest of an upload of an earlier start.
+        // Uploads of an earlier start are never completed.
         let _ = std::fs::remove_dir_all(&self.uploads);
         folders.iter().try_for_each(|folder| make_private(folder))?;
         let tidy = move || folders.iter().for_each(|folder| tidy(folder, DEPTH));
@@ -78,10 +84,10 @@ impl Folders {
     }
 }
 
-/// Folders below the server's own that hold files of it: a drive, and its images.
+/// Depth of the server's files below these folders: a drive, and its images.
 const DEPTH: usize = 2;
 
-/// Removes what killed programs left in a folder and those below it.
+/// Removes remains of killed programs from a folder and its subfolders.
 fn tidy(folder: &Path, depth: usize) {
     remove_left_overs(folder, None);
     if depth == 0 {
@@ -93,19 +99,19 @@ fn tidy(folder: &Path, depth: usize) {
     }
 }
 
-/// Makes a folder for its owner alone, or takes the rights of others away from one that exists.
+/// Creates a folder for its owner only, or removes the permissions of others from an existing one.
 ///
 /// # Errors
-/// Those of the system.
+/// Errors of the system.
 pub(crate) fn make_private(folder: &Path) -> Result<()> {
     make(folder)?;
     restrict(folder, 0o700)
 }
 
-/// Makes a folder for its owner alone; one that exists keeps its rights.
+/// Creates a folder for its owner only; an existing one keeps its permissions.
 ///
 /// # Errors
-/// Those of the system.
+/// Errors of the system.
 pub(crate) fn make(folder: &Path) -> Result<()> {
     let mut builder = std::fs::DirBuilder::new();
     builder.recursive(true);
@@ -114,15 +120,15 @@ pub(crate) fn make(folder: &Path) -> Result<()> {
     builder.create(folder)
 }
 
-/// Takes the rights of others away from a file.
+/// Removes the permissions of others from a file.
 ///
 /// # Errors
-/// Those of the system.
+/// Errors of the system.
 pub(crate) fn make_file_private(file: &Path) -> Result<()> {
     restrict(file, 0o600)
 }
 
-/// Takes all rights away that are not in `mode`.
+/// Removes all permissions that are not in `mode`.
 #[cfg(unix)]
 fn restrict(path: &Path, mode: u32) -> Result<()> {
     use std::os::unix::fs::PermissionsExt;
@@ -135,7 +141,7 @@ fn restrict(path: &Path, mode: u32) -> Result<()> {
 
 #[cfg(not(unix))]
 fn restrict(_path: &Path, _mode: u32) -> Result<()> {
-    // There, the folder of a user is the user's alone already.
+    // On other systems, the folder of a user is already private.
     Ok(())
 }
 
@@ -145,7 +151,7 @@ mod tests {
     use std::os::unix::fs::PermissionsExt;
 
     #[test]
-    fn folders_and_files_are_for_their_owner_alone() {
+    fn folders_and_files_are_accessible_to_their_owner_only() {
         let folder = tempfile::tempdir().unwrap();
         let mode = |path: &Path| std::fs::metadata(path).unwrap().permissions().mode() & 0o777;
         let (new, old) = (folder.path().join("new/below"), folder.path().join("old"));

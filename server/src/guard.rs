@@ -1,12 +1,12 @@
-//! Who may speak to the server: the checks that come before every route, and the headers on every answer.
+//! Access control: the checks before every route, and the security headers of every answer.
 //!
-//! A page of any site can send requests to a server on this machine. What stops it: the Host must be one of
-//! ours, exactly (a rebinding page controls both Host and Origin, so comparing them with each other would
-//! prove nothing); a foreign Origin may change nothing and open no WebSocket; bodies must be JSON, which a
-//! form cannot send. Scripts without a browser send no Origin and are not hindered.
+//! A page of any site can send requests to a server on this machine. Three checks prevent abuse. The Host must be one of
+//! ours, exactly: a rebinding page controls both Host and Origin, so comparing them with each other would prove nothing. A
+//! foreign Origin may change nothing and open no WebSocket. Bodies must be JSON, which a form cannot send. Scripts send no
+//! Origin and are not affected.
 //!
-//! Other users of this machine, and other machines, need the access token: for everything but the files of the page, which
-//! are the same for everybody, and the route that exchanges the token for a cookie.
+//! Other users of this machine, and other machines, need the access token for everything except the files of the page, which
+//! are public, and the route that exchanges the token for a cookie.
 
 use axum::extract::{Request, State};
 use axum::http::header::{self, HeaderName};
@@ -21,10 +21,10 @@ use crate::public_url::PublicUrl;
 use crate::request_id;
 use tracing::Instrument;
 
-/// The only route below `/api` that needs no token, because it asks for it.
+/// The only route below `/api` without a token check, because it receives the token.
 const LOGIN: &str = "/api/v1/login";
 
-/// Checks a request before it is routed, and puts the headers on its answer.
+/// Checks a request before routing, and sets the headers of its answer.
 pub(crate) async fn guard(State(access): State<Access>, request: Request, next: Next) -> Response {
     let checked = check(&access, request.method(), request.uri(), request.headers());
     let (host, is_api) = match &checked {
@@ -42,13 +42,13 @@ pub(crate) async fn guard(State(access): State<Access>, request: Request, next: 
         }
     };
     let mut response = answer.instrument(tracing::info_span!("request", id)).await;
-    response = request_id::told(response, &id).await;
+    response = request_id::add_to_problem(response, &id).await;
     let published = access.public().map(PublicUrl::authority);
     put_headers(response.headers_mut(), &[host.as_deref(), published], is_api);
     response
 }
 
-/// The host by which we are addressed, where the request may come in.
+/// The host name of the request, if the request is allowed.
 fn check(access: &Access, method: &Method, uri: &Uri, headers: &HeaderMap) -> ApiResult<String> {
     let hosts = access.hosts();
     let mut named = headers.get_all(header::HOST).iter();
@@ -70,10 +70,11 @@ fn check(access: &Access, method: &Method, uri: &Uri, headers: &HeaderMap) -> Ap
             return Err(ApiError::forbidden("origin", "A page of another site may not do this."));
         }
     }
-    let said = |name: &'static str| headers.get(HeaderName::from_static(name)).map(HeaderValue::as_bytes);
-    let is_navigation = *method == Method::GET && said("sec-fetch-mode") == Some(b"navigate") && !is_upgrade;
-    // Another port of this machine is the same site, so that its requests have our cookie.
-    let is_foreign = matches!(said("sec-fetch-site"), Some(b"cross-site" | b"same-site"));
+    let value_of = |name: &'static str| headers.get(HeaderName::from_static(name)).map(HeaderValue::as_bytes);
+    let is_navigation =
+        *method == Method::GET && value_of("sec-fetch-mode") == Some(b"navigate") && !is_upgrade;
+    // Another port of this machine is the same site, so its requests include our cookie.
+    let is_foreign = matches!(value_of("sec-fetch-site"), Some(b"cross-site" | b"same-site"));
     if is_foreign && !is_navigation {
         return Err(ApiError::forbidden("origin", "A page of another site may not read this."));
     }
@@ -90,14 +91,14 @@ fn foreign_host() -> ApiError {
 }
 
 fn put_headers(headers: &mut HeaderMap, hosts: &[Option<&str>], is_api: bool) {
-    // The hosts were checked, so they can end no directive. Older browsers do not count WebSockets as 'self'.
+    // The hosts were checked and cannot terminate a directive. Older browsers do not include WebSockets in 'self'.
     let sockets: String = hosts.iter().flatten().map(|host| format!(" ws://{host} wss://{host}")).collect();
     let policy = format!(
         "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'self'{sockets}; \
          img-src 'self' data: blob:; object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
     );
     let policy = HeaderValue::try_from(policy).unwrap_or(HeaderValue::from_static("default-src 'none'"));
-    // A page that is a document of its own brings a narrower one.
+    // A self-contained page sets a stricter policy.
     headers.entry(header::CONTENT_SECURITY_POLICY).or_insert(policy);
     headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
     headers.insert(header::REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
@@ -125,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn only_our_own_names_are_answered_and_only_exactly() {
+    fn only_exact_own_host_names_are_answered() {
         for host in ["localhost:7700", "127.0.0.1:7700", "[::1]:7700", "LOCALHOST:7700", "rover.example"] {
             assert!(verdict(Method::GET, &[("host", host)]).is_ok(), "{host}");
         }

@@ -1,15 +1,15 @@
-//! Pages made of text: what comes from outside is escaped, notes are turned from Markdown without any markup of their
-//! own, and pictures stand in the page itself, so that a page needs nothing else.
+//! Self-contained HTML pages: external text is escaped, the Markdown of notes is converted without raw HTML, and images are
+//! embedded.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use pulldown_cmark::{CowStr, Event, Options, Parser, Tag, TagEnd};
 
-/// What a page that needs nothing else may do: show itself.
+/// The content security policy of a self-contained page: it may only display itself.
 pub(crate) const ALONE: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'; \
                          frame-ancestors 'self'; sandbox allow-popups";
 
-/// Text as it stands in a page or in an attribute.
+/// Escapes text for element content or an attribute.
 pub(crate) fn escape(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {
@@ -19,7 +19,7 @@ pub(crate) fn escape(text: &str) -> String {
             '>' => safe.push_str("&gt;"),
             '"' => safe.push_str("&quot;"),
             '\'' => safe.push_str("&#39;"),
-            // What XML and HTML do not have as a character.
+            // Control characters are not allowed in XML and HTML.
             c if c.is_control() && !"\n\t".contains(c) => safe.push(' '),
             c => safe.push(c),
         }
@@ -27,18 +27,18 @@ pub(crate) fn escape(text: &str) -> String {
     safe
 }
 
-/// A picture as the address of itself.
+/// A PNG image as a data URL.
 pub(crate) fn png_address(png: &[u8]) -> String {
     format!("data:image/png;base64,{}", STANDARD.encode(png))
 }
 
-/// A note's Markdown as a piece of a page: its own HTML is shown as it is written, pictures are their words, and links lead
-/// to the web alone.
+/// Converts a note's Markdown to HTML: raw HTML is shown as text, images become their alternative text, and links may lead
+/// to the web only.
 pub(crate) fn markdown(text: &str) -> String {
     let options = Options::ENABLE_STRIKETHROUGH | Options::ENABLE_TABLES;
     let mut html = String::new();
     let mut is_in_head = false;
-    // Whether each open link may be one.
+    // For each open link, whether its address is allowed.
     let mut links: Vec<bool> = Vec::new();
     for event in Parser::new_ext(text, options) {
         match event {
@@ -79,7 +79,7 @@ fn is_web(address: &CowStr<'_>) -> bool {
 fn opening(tag: &Tag<'_>, is_in_head: bool) -> String {
     match tag {
         Tag::Paragraph => "<p>".to_owned(),
-        // The page has headings of its own, below which those of a note must not stand out.
+        // Headings of a note must not stand out from those of the page.
         Tag::Heading { .. } => "<p><strong>".to_owned(),
         Tag::BlockQuote(_) => "<blockquote>".to_owned(),
         Tag::CodeBlock(_) => "<pre><code>".to_owned(),
@@ -117,7 +117,7 @@ fn closing(tag: TagEnd, is_in_head: bool) -> &'static str {
     }
 }
 
-/// A table with a caption, its first column the names of the rows.
+/// A table with a caption; its first column contains row headers.
 pub(crate) fn table(caption: &str, head: &[&str], rows: &[Vec<String>]) -> String {
     let head: String = head.iter().map(|words| format!("<th scope=\"col\">{}</th>", escape(words))).collect();
     let mut html = format!(
@@ -139,7 +139,7 @@ pub(crate) fn table(caption: &str, head: &[&str], rows: &[Vec<String>]) -> Strin
     html
 }
 
-/// A number with as many digits as make sense for its size; nothing where there is none.
+/// A number with `digits` decimals; a dash if it is missing or not finite.
 pub(crate) fn number(value: Option<f64>, digits: usize) -> String {
     value
         .filter(|value| value.is_finite())
@@ -151,7 +151,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn text_cannot_become_markup() {
+    fn text_is_escaped() {
         assert_eq!(escape("<b a=\"1\">&'\u{0}"), "&lt;b a=&quot;1&quot;&gt;&amp;&#39; ");
     }
 

@@ -1,8 +1,9 @@
-//! `Idempotency-Key`: a request that creates something can be sent again, after a broken connection, without creating it twice.
+//! `Idempotency-Key`: a client can repeat a creating request after a broken connection without creating the resource twice.
 //!
-//! The same key with the same request gives the same answer as long as the server runs and the answer is among the last ones
-//! (limits `answers` and `answer_bytes`); with another request it is refused. A request with a key is carried out also when its sender goes away, because
-//! the sender will ask again. Only what succeeded is kept: a refused request has created nothing.
+//! The same key with the same request returns the same answer while the server runs and the answer is among the most recent
+//! ones (limits `answers` and `answer_bytes`); with another request the key is rejected. A request with a key completes even
+//! if its sender disconnects, because the sender will repeat it. Only successful answers are stored: a rejected request has
+//! created nothing.
 
 use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Mutex};
@@ -25,43 +26,43 @@ use crate::problem::{ApiError, ApiResult};
 
 /// The header with the key.
 const HEADER: &str = "idempotency-key";
-/// The most characters that a key may have.
+/// Maximum length of a key, characters.
 const KEY_LIMIT: usize = 255;
 
-/// The answers to requests with keys.
+/// Stored answers to requests with keys.
 pub(crate) struct Answers {
-    kept: Mutex<Kept>,
+    stored: Mutex<StoredAnswers>,
     limits: SharedLimits,
 }
 
 #[derive(Default)]
-struct Kept {
-    by_key: HashMap<String, Known>,
-    /// The keys whose answers are kept, the oldest first.
+struct StoredAnswers {
+    by_key: HashMap<String, KnownRequest>,
+    /// The keys with stored answers, oldest first.
     order: VecDeque<String>,
     bytes: usize,
 }
 
-/// A request with a key.
+/// A request that has a key.
 #[derive(Clone)]
-struct Known {
+struct KnownRequest {
     /// SHA-256 of path and body.
     request: [u8; 32],
     state: watch::Receiver<Progress>,
 }
 
-/// How far a request is.
+/// Progress of a request.
 #[derive(Clone)]
 enum Progress {
-    /// It is being carried out.
+    /// The request is being processed.
     Begun,
-    /// It succeeded.
+    /// The request succeeded.
     Done(Arc<Answer>),
-    /// It was refused, so that it may be sent again.
+    /// The request was rejected and may be repeated.
     Refused,
 }
 
-/// An answer that is given again.
+/// A stored answer.
 struct Answer {
     status: StatusCode,
     headers: HeaderMap,
@@ -74,12 +75,12 @@ impl IntoResponse for &Answer {
     }
 }
 
-/// The header in the OpenAPI document.
+/// The header parameter for the OpenAPI document.
 pub(crate) fn parameter() -> Parameter {
     let schema =
         ObjectBuilder::new().schema_type(Type::String).min_length(Some(1)).max_length(Some(KEY_LIMIT));
     let description = "A key of your own, such as a UUID: the same request with the same key is carried out once and has the \
-                       same answer; the last 1,000 are remembered while the server runs";
+                       same answer; the most recent answers are kept while the server runs (limits `answers` and `answer_bytes`)";
     ParameterBuilder::new()
         .name("Idempotency-Key")
         .parameter_in(ParameterIn::Header)
@@ -88,7 +89,7 @@ pub(crate) fn parameter() -> Parameter {
         .build()
 }
 
-/// Carries a request with a key out once.
+/// Processes a request with a key once.
 pub(crate) async fn once(State(answers): State<Arc<Answers>>, request: Request, next: Next) -> Response {
     let is_creating = request.method() == Method::POST && is_creating(request.uri().path());
     if !is_creating || !request.headers().contains_key(HEADER) {
@@ -120,7 +121,7 @@ async fn with_key(answers: &Arc<Answers>, request: Request, next: Next) -> ApiRe
         };
         let progress = match known.state.wait_for(|progress| !matches!(progress, Progress::Begun)).await {
             Ok(progress) => progress.clone(),
-            // Nobody works on it any more.
+            // The sender was dropped without an answer.
             Err(_) => Progress::Refused,
         };
         if let Progress::Done(answer) = progress {
@@ -129,7 +130,7 @@ async fn with_key(answers: &Arc<Answers>, request: Request, next: Next) -> ApiRe
     }
 }
 
-/// Whether a path below `/api/v1` is that of an endpoint that creates something.
+/// Whether a path below `/api/v1` is that of a creating endpoint.
 fn is_creating(path: &str) -> bool {
     let path = path.strip_prefix("/api/v1").unwrap_or(path);
     let fits = |template: &&str| {
@@ -159,23 +160,27 @@ fn key(headers: &HeaderMap) -> ApiResult<String> {
 }
 
 impl Answers {
-    /// No answers yet.
+    /// An empty store.
     pub(crate) fn new(limits: &SharedLimits) -> Self {
-        Self { kept: Mutex::default(), limits: Arc::clone(limits) }
+        Self { stored: Mutex::default(), limits: Arc::clone(limits) }
     }
 
-    /// The memory of the answers, bytes.
+    /// Memory used by the stored answers, bytes.
     pub(crate) fn bytes(&self) -> usize {
-        lock(&self.kept).bytes
+        lock(&self.stored).bytes
     }
 
-    /// The request with that key, or the right to carry it out.
+    /// The known request with that key, or the right to process it.
     ///
     /// # Errors
-    /// A problem when the key was used for another request.
-    fn find_or_begin(self: &Arc<Self>, key: &str, request: [u8; 32]) -> ApiResult<Result<Known, Begun>> {
-        let mut kept = lock(&self.kept);
-        if let Some(known) = kept.by_key.get(key) {
+    /// A problem if the key was used for another request.
+    fn find_or_begin(
+        self: &Arc<Self>,
+        key: &str,
+        request: [u8; 32],
+    ) -> ApiResult<Result<KnownRequest, Begun>> {
+        let mut stored = lock(&self.stored);
+        if let Some(known) = stored.by_key.get(key) {
             if known.request == request {
                 return Ok(Ok(known.clone()));
             }
@@ -183,27 +188,27 @@ impl Answers {
             return Err(ApiError::invalid("idempotency_key", detail).hint("Use a new key for each request."));
         }
         let (sender, state) = watch::channel(Progress::Begun);
-        kept.by_key.insert(key.to_owned(), Known { request, state });
+        stored.by_key.insert(key.to_owned(), KnownRequest { request, state });
         Ok(Err(Begun { answers: Arc::clone(self), key: key.to_owned(), sender, is_done: false }))
     }
 
-    /// Keeps an answer; the oldest go.
+    /// Stores an answer and discards the oldest ones beyond the limits.
     fn keep(&self, key: &str, bytes: usize) {
-        let mut kept = lock(&self.kept);
-        kept.order.push_back(key.to_owned());
-        kept.bytes += bytes;
+        let mut stored = lock(&self.stored);
+        stored.order.push_back(key.to_owned());
+        stored.bytes += bytes;
         let (most, most_bytes) = (self.limits.answers.count(), self.limits.answer_bytes.count());
-        while kept.order.len() > most || (kept.bytes > most_bytes && kept.order.len() > 1) {
-            let Some(oldest) = kept.order.pop_front() else { break };
-            let gone = kept.by_key.remove(&oldest);
+        while stored.order.len() > most || (stored.bytes > most_bytes && stored.order.len() > 1) {
+            let Some(oldest) = stored.order.pop_front() else { break };
+            let gone = stored.by_key.remove(&oldest);
             if let Some(Progress::Done(answer)) = gone.map(|known| known.state.borrow().clone()) {
-                kept.bytes -= answer.body.len();
+                stored.bytes -= answer.body.len();
             }
         }
     }
 }
 
-/// The right to carry a request out; without a success the key may be used again.
+/// The right to process a request; without success the key becomes free again.
 struct Begun {
     answers: Arc<Answers>,
     key: String,
@@ -212,7 +217,7 @@ struct Begun {
 }
 
 impl Begun {
-    /// Carries the request out, whether or not its sender waits.
+    /// Processes the request even if its sender disconnects.
     async fn carry_out(self, request: Request, next: Next) -> ApiResult<Response> {
         let work = tokio::spawn(async move {
             let mut begun = self;
@@ -236,7 +241,7 @@ impl Begun {
 impl Drop for Begun {
     fn drop(&mut self) {
         if !self.is_done {
-            lock(&self.answers.kept).by_key.remove(&self.key);
+            lock(&self.answers.stored).by_key.remove(&self.key);
             self.sender.send_replace(Progress::Refused);
         }
     }
@@ -271,8 +276,8 @@ mod tests {
         };
         (0..most + 5).for_each(|number| keep(number.to_string(), 1));
         let count = || {
-            let kept = lock(&answers.kept);
-            (kept.by_key.len(), kept.order.len(), kept.bytes)
+            let stored = lock(&answers.stored);
+            (stored.by_key.len(), stored.order.len(), stored.bytes)
         };
         assert_eq!(count(), (most, most, most));
         keep("large".to_owned(), most_bytes);

@@ -1,11 +1,11 @@
-//! Which drive a folder contains: the same identity gives the same numbers.
+//! Identifies the drive in a folder: the same identity gives the same numbers.
 //!
-//! A simulated drive follows from its index. A recorded drive is its index together with the contents of the files that the
-//! index names (images and camera files): `name-IIIIII-FFFFFF` with the first digits of the SHA-256 of both. Earlier versions
-//! named recorded drives by the index alone (`name-IIIIII`); [`Identity::relation`] recognises such names.
+//! A simulated drive is determined by its index. A recorded drive is determined by its index and the contents of the files
+//! that the index names (images and camera files): `name-IIIIII-FFFFFF` with the first digits of the SHA-256 of both.
+//! Earlier versions named recorded drives by the index only (`name-IIIIII`); [`Identity::relation`] recognises such names.
 //!
-//! Hashing reads every image once. The digests are kept in a folder of the server, by the size, times and inode of each
-//! file, so that a later start reads only what was exchanged. `docs/benchmarks.md` has the cost.
+//! Hashing reads every image once. The server caches the digests by size, times and inode of each file, so that a later
+//! start reads only changed files. `docs/benchmarks.md` reports the cost.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::Metadata;
@@ -24,47 +24,47 @@ use sightline_world::traverse::{CameraSource, TraverseIndex};
 
 use crate::naming::{digits, hash, name_of};
 
-/// Bytes that are read at a time.
+/// Bytes per read.
 const CHUNK: usize = 1 << 20;
 
-/// Hexadecimal digits of a digest in a name.
+/// Hexadecimal digits of a digest that are used in a name.
 const DIGITS: usize = 6;
 
-/// What a drive is.
+/// The identity of a drive.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Identity {
-    /// The part of the name that follows from the index.
+    /// The part of the name derived from the index.
     index_name: String,
     /// SHA-256 of the files of a recorded drive; `None` for a simulated one.
     pub(crate) files_sha256: Option<String>,
 }
 
-/// How a name that was stored earlier relates to a drive.
+/// How a stored name relates to a drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Relation {
-    /// It is the drive.
+    /// The same drive.
     Same,
-    /// It is the drive's name of an earlier version, which did not cover the files.
+    /// The same index, in a name of an earlier version, which did not cover the files.
     SameIndex,
-    /// It is a recorded drive of the same index with other files.
+    /// A recorded drive with the same index and other files.
     OtherFiles,
-    /// It is another drive.
+    /// Another drive.
     Other,
 }
 
 impl Identity {
-    /// The identity of a traverse; `kept` is the folder of known digests, `None` to read every file.
+    /// Computes the identity of a traverse; `cache_folder` is the folder of cached digests, `None` to read every file.
     ///
     /// # Errors
-    /// An index that cannot be written as JSON.
-    pub(crate) fn of(traverse: &Traverse, kept: Option<&Path>) -> Result<Self> {
+    /// An index that cannot be serialised as JSON.
+    pub(crate) fn of(traverse: &Traverse, cache_folder: Option<&Path>) -> Result<Self> {
         let is_recorded = traverse.index().scenario.is_none();
-        let files_sha256 = is_recorded.then(|| files_digest(traverse, kept));
+        let files_sha256 = is_recorded.then(|| files_digest(traverse, cache_folder));
         Ok(Self { index_name: name_of(traverse)?, files_sha256 })
     }
 
-    /// The identity of a drive on commands, which grows: the name of its folder.
-    pub(crate) fn driven(name: String) -> Self {
+    /// The identity of a commanded drive, which grows: the name of its folder.
+    pub(crate) fn of_commanded_drive(name: String) -> Self {
         Self { index_name: name, files_sha256: None }
     }
 
@@ -93,12 +93,12 @@ impl Identity {
     }
 }
 
-/// What is known of a file without reading it.
+/// File metadata that reveal a change without reading the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 struct Stamp {
     bytes: u64,
     modified_ns: u128,
-    /// The time of the last change of the inode and its number; zero on systems without them.
+    /// Time of the last inode change (s, ns) and inode number; zero on systems without inodes.
     inode: (i64, i64, u64),
 }
 
@@ -116,27 +116,27 @@ impl Stamp {
     }
 }
 
-/// The digest of a file as it was.
+/// The digest of a file with the metadata at that time.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-struct Known {
+struct FileDigest {
     stamp: Stamp,
     sha256: String,
 }
 
-/// Digests by the names of files in the index.
-type Digests = BTreeMap<String, Known>;
+/// Digests by file name in the index.
+type Digests = BTreeMap<String, FileDigest>;
 
-/// The SHA-256 of the files that the index names: of their names and contents in the order of names.
-fn files_digest(traverse: &Traverse, kept: Option<&Path>) -> String {
+/// The SHA-256 over the names and contents of the files in the index, in the order of names.
+fn files_digest(traverse: &Traverse, cache_folder: Option<&Path>) -> String {
     let folder = traverse.folder();
-    let list = kept.map(|kept| {
+    let list = cache_folder.map(|cache_folder| {
         let real = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
-        kept.join(format!("{}.json", hash(real.as_os_str().as_encoded_bytes())))
+        cache_folder.join(format!("{}.json", hash(real.as_os_str().as_encoded_bytes())))
     });
     let text = list.as_ref().and_then(|list| std::fs::read(list).ok());
     let known: Digests = text.and_then(|text| serde_json::from_slice(&text).ok()).unwrap_or_default();
     let names: Vec<&str> = files_of(traverse.index()).into_iter().collect();
-    let found: Vec<Option<Known>> =
+    let found: Vec<Option<FileDigest>> =
         names.par_iter().map(|name| digest_of(&folder.join(name), known.get(*name))).collect();
     let mut whole = Sha256::new();
     for (name, found) in names.iter().zip(&found) {
@@ -150,13 +150,13 @@ fn files_digest(traverse: &Traverse, kept: Option<&Path>) -> String {
         && let Ok(text) = serde_json::to_vec(&found)
         && let Err(error) = write_atomically(&list, &text)
     {
-        // The digests are only computed again at the next start.
+        // Then the digests are computed again at the next start.
         tracing::debug!("digests are not kept: {error}");
     }
     digits(&whole.finalize())
 }
 
-/// The names of images and camera files, each once.
+/// The distinct names of images and camera files.
 fn files_of(index: &TraverseIndex) -> BTreeSet<&str> {
     let views = index.stops.iter().flat_map(|stop| [&stop.left, &stop.right]);
     let files = views.flat_map(|view| {
@@ -169,8 +169,8 @@ fn files_of(index: &TraverseIndex) -> BTreeSet<&str> {
     files.flatten().collect()
 }
 
-/// The digest of a file; `None` where it cannot be read.
-fn digest_of(path: &Path, known: Option<&Known>) -> Option<Known> {
+/// The digest of a file; `None` if it cannot be read.
+fn digest_of(path: &Path, known: Option<&FileDigest>) -> Option<FileDigest> {
     let stamp = Stamp::of(&std::fs::metadata(path).ok()?);
     if let Some(known) = known.filter(|known| known.stamp == stamp) {
         return Some(known.clone());
@@ -185,7 +185,7 @@ fn digest_of(path: &Path, known: Option<&Known>) -> Option<Known> {
             Err(_) => return None,
         }
     }
-    Some(Known { stamp, sha256: digits(&sum.finalize()) })
+    Some(FileDigest { stamp, sha256: digits(&sum.finalize()) })
 }
 
 #[cfg(test)]
@@ -216,12 +216,12 @@ mod tests {
     }
 
     #[test]
-    fn a_kept_digest_is_used_until_the_file_is_another() {
+    fn a_cached_digest_is_used_until_the_file_changes() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("left.png");
         std::fs::write(&path, b"one").unwrap();
         let first = digest_of(&path, None).unwrap();
-        let marked = Known { sha256: "marked".to_owned(), ..first.clone() };
+        let marked = FileDigest { sha256: "marked".to_owned(), ..first.clone() };
         assert_eq!(digest_of(&path, Some(&marked)).unwrap(), marked);
         let exchanged = folder.path().join("other.png");
         std::fs::write(&exchanged, b"two").unwrap();

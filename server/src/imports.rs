@@ -1,7 +1,7 @@
-//! Imports of recordings as drives: one at a time, with progress, and opened again after a restart.
+//! Imports recordings as drives: one at a time, with progress. Imported drives are reopened after a restart.
 //!
-//! Each import has a folder of its own, whose index is written last: a folder without an index is a left-over of a server that
-//! was killed, and is removed at the next start. A native drive is opened where it is; a file with its path refers to it.
+//! Each import has its own folder, whose index is written last: a folder without an index is the remains of a killed server
+//! and is removed at the next start. A native drive is opened in place; a file with its path refers to it.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,9 +18,9 @@ use sightline_recordings::import::import;
 use sightline_track::locate::store::Cache;
 use tokio::sync::broadcast;
 
-use crate::brought::remove_folder;
 use crate::folders::{Folders, make_private};
 use crate::identity::Identity;
+use crate::import_session::remove_folder;
 use crate::jobs::{Lane, lock};
 use crate::limits::SharedLimits;
 use crate::naming::{hash, slug};
@@ -29,7 +29,7 @@ use crate::recordings::{Confined, confine_named, refusal};
 use crate::rendering::OpenTraverse;
 use crate::state::AppState;
 
-/// How the name of a file ends that refers to a drive elsewhere.
+/// File extension of references to drives elsewhere.
 const REFERENCE: &str = "path";
 
 /// The imports of a server.
@@ -39,7 +39,7 @@ pub(crate) struct Imports {
     limits: SharedLimits,
 }
 
-/// An import that was started.
+/// A started import.
 struct Job {
     recording: Confined,
     view: Mutex<ImportJob>,
@@ -47,7 +47,7 @@ struct Job {
 }
 
 impl Imports {
-    /// No imports.
+    /// An empty list.
     pub(crate) fn new(limits: &SharedLimits) -> Self {
         let lane = Lane::new(1, limits.imports_waiting.count());
         Self { lane, jobs: Mutex::default(), limits: Arc::clone(limits) }
@@ -56,7 +56,7 @@ impl Imports {
     /// Starts an import.
     ///
     /// # Errors
-    /// A problem when too many are under way.
+    /// A problem if too many are waiting.
     pub(crate) fn start(&self, state: &AppState, recording: Confined) -> ApiResult<ImportJob> {
         let job = self.add(recording)?;
         let (work, state) = (Arc::clone(&job), state.clone());
@@ -92,18 +92,18 @@ impl Imports {
         Ok(job)
     }
 
-    /// How far an import is.
+    /// The progress of an import.
     ///
     /// # Errors
-    /// A problem when there is none of that name.
+    /// A problem if it does not exist.
     pub(crate) fn view(&self, id: &str) -> ApiResult<ImportJob> {
         Ok(self.job(id)?.view())
     }
 
-    /// Cancels an import; one that has ended stays as it is.
+    /// Cancels an import; has no effect on a finished one.
     ///
     /// # Errors
-    /// A problem when there is none of that name.
+    /// A problem if it does not exist.
     pub(crate) fn cancel(&self, id: &str) -> ApiResult<ImportJob> {
         let job = self.job(id)?;
         job.cancel.store(true, Ordering::Relaxed);
@@ -121,14 +121,14 @@ impl Job {
         lock(&self.view).clone()
     }
 
-    /// Changes the view and tells every page.
+    /// Changes the view and notifies all pages.
     fn change(&self, state: &AppState, change: impl FnOnce(&mut ImportJob)) {
         let job = {
             let mut view = lock(&self.view);
             change(&mut view);
             view.clone()
         };
-        state.tell(Event::ImportProgress { job });
+        state.send_event(Event::ImportProgress { job });
     }
 
     fn carry_out(&self, state: &AppState) {
@@ -147,7 +147,7 @@ impl Job {
         });
     }
 
-    /// Imports and opens; the name of the drive.
+    /// Imports and opens the recording; returns the name of the drive.
     fn import(&self, state: &AppState) -> ApiResult<String> {
         Cancel::from(&self.cancel).check()?;
         let (folders, options) = (state.folders(), self.recording.options());
@@ -162,11 +162,11 @@ impl Job {
             .fill(state, &folder, examined.is_native)
             .and_then(|notes| Ok((notes, self.open(state, &folder)?)));
         let (notes, open) = made.inspect_err(|_| {
-            // The first problem is the one to tell.
+            // Ignored, so that the first problem is reported.
             let _ = remove_folder(&folder);
         })?;
         if open.traverse.folder() != folder {
-            // It was open already.
+            // The drive was already open.
             remove_folder(&folder)?;
         }
         if self.recording.is_upload {
@@ -176,20 +176,20 @@ impl Job {
         Ok(open.id.clone())
     }
 
-    /// Makes the drive in its folder; what was left out or assumed.
+    /// Creates the drive in `folder`; returns notes about omissions and assumptions.
     fn fill(&self, state: &AppState, folder: &Path, is_native: bool) -> ApiResult<Vec<String>> {
         if is_native {
-            // The folder is empty, so that the other one takes its place.
+            // The folder is empty, so the rename replaces it.
             let moved = std::fs::rename(&self.recording.path, folder);
             moved.map_err(|source| Error::Write { path: folder.to_owned(), source })?;
             return Ok(Vec::new());
         }
-        let mut told = 0;
+        let mut reported_share = 0;
         let mut progress = |k: usize, n: usize| {
-            // A hundred messages are enough for a bar.
+            // At most a hundred messages.
             let share = k * 100 / n.max(1);
-            if share > told || k == 0 {
-                told = share;
+            if share > reported_share || k == 0 {
+                reported_share = share;
                 self.change(state, |view| (view.k, view.n) = (k, n));
             }
         };
@@ -198,7 +198,7 @@ impl Job {
         Ok(made.map_err(refusal)?.notes)
     }
 
-    /// Opens a native drive where it is.
+    /// Opens a native drive in place.
     fn open_in_place(&self, state: &AppState) -> ApiResult<String> {
         let open = self.open(state, &self.recording.path)?;
         if state.is_removable(&open) && open.traverse.folder() == self.recording.path {
@@ -209,7 +209,7 @@ impl Job {
     }
 
     fn open(&self, state: &AppState, folder: &Path) -> ApiResult<Arc<OpenTraverse>> {
-        let _making = state.making_drives();
+        let _lock = state.drive_folder_lock();
         let (traverse, count) = (Traverse::open(folder).map_err(refusal)?, state.traverses().len());
         let limits = state.limits();
         limits.check_drive(&traverse)?;
@@ -224,19 +224,19 @@ impl Job {
     }
 }
 
-/// A new folder in that of all imports.
+/// Creates a new folder among the imports.
 fn new_folder(imported: &Path, name: &str) -> Result<PathBuf> {
     let prefix = format!("{}-", slug(name));
     let made = tempfile::Builder::new().prefix(&prefix).tempdir_in(imported);
     made.map(tempfile::TempDir::keep).map_err(|source| Error::Write { path: imported.to_owned(), source })
 }
 
-/// The file that refers to a drive elsewhere.
+/// The path of the file that refers to a drive elsewhere.
 fn reference(imported: &Path, folder: &Path) -> PathBuf {
     imported.join(format!("{}.{REFERENCE}", hash(folder.as_os_str().as_encoded_bytes())))
 }
 
-/// Removes what was kept of a drive if it was imported or opened by its path; whether it was.
+/// Removes the files of a drive if it was imported or opened by its path; returns whether it was.
 ///
 /// # Errors
 /// A folder or file that cannot be removed.
@@ -254,8 +254,8 @@ pub(crate) fn forget(folders: &Folders, open: &OpenTraverse) -> Result<bool> {
     }
 }
 
-/// Opens the imports of earlier starts; what cannot be opened is said in one sentence each.
-pub(crate) fn open_again(
+/// Reopens the imports of earlier starts; returns one sentence for each that cannot be opened.
+pub(crate) fn reopen(
     folders: &Folders,
     cache: &Arc<Cache>,
     open: &mut Vec<Arc<OpenTraverse>>,
@@ -266,7 +266,7 @@ pub(crate) fn open_again(
     all.sort();
     let mut lost = Vec::new();
     for path in all {
-        let opened = match place(folders, &path) {
+        let opened = match traverse_folder(folders, &path) {
             Ok(Some(folder)) => Traverse::open(&folder).map_err(|error| error.to_string()),
             Ok(None) => continue,
             Err(why) => Err(why),
@@ -286,14 +286,14 @@ pub(crate) fn open_again(
     lost
 }
 
-/// The drive of an entry in the folder of imports; none of a left-over, which is removed.
-fn place(folders: &Folders, entry: &Path) -> std::result::Result<Option<PathBuf>, String> {
+/// The drive of an entry in the folder of imports; removes remains of an interrupted import and returns `None`.
+fn traverse_folder(folders: &Folders, entry: &Path) -> std::result::Result<Option<PathBuf>, String> {
     if entry.is_dir() {
         let names = ["traverse.toml", "traverse.json"];
         if names.iter().any(|name| entry.join(name).is_file()) {
             return Ok(Some(entry.to_owned()));
         }
-        // One that stays does no harm.
+        // A failure to remove it is harmless.
         let _ = remove_folder(entry);
         return Ok(None);
     }

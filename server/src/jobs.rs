@@ -1,7 +1,7 @@
-//! Work that takes long, on threads of its own: each lane does so much at a time, first come first served, and lets
-//! so much wait. A job of many turns queues again after each, so that short ones do not wait for long ones.
+//! Threads for long work. Each lane runs a fixed number of jobs at a time, in order of arrival, and limits the number of
+//! waiting ones. A job of many turns queues again after each turn, so that short jobs are not delayed by long ones.
 //!
-//! The reactor computes nothing. A lane that is full refuses at once, so that nothing piles up unseen.
+//! The async reactor computes nothing. A full lane rejects new work at once.
 
 use std::collections::BTreeSet;
 use std::future::Future;
@@ -19,46 +19,46 @@ use crate::cancel::{CancelFlag, CancelOnDrop, Deadline};
 use crate::limits::SharedLimits;
 use crate::problem::{ApiError, ApiResult};
 
-/// Locks, also after a panic elsewhere: what these mutexes guard is never left half changed.
+/// Locks even after a panic in another thread: the data behind these mutexes are never left half changed.
 pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A queue with a limited number of threads: for work that a request waits for, and for work in the background.
+/// A queue with a limited number of threads, for work that a request awaits and for background work.
 #[derive(Clone)]
 pub(crate) struct Lane {
     permits: Arc<Semaphore>,
     queue: Arc<Queue>,
     at_a_time: usize,
     limit: usize,
-    /// Where the work for a request has a limit of its time.
+    /// Limits with the maximum time of a request's work; `None` without a time limit.
     limits: Option<SharedLimits>,
 }
 
 impl Lane {
-    /// A lane for `at_a_time` pieces of work, with at most `limit` more waiting.
+    /// A lane that runs `at_a_time` jobs and lets at most `limit` more wait.
     pub(crate) fn new(at_a_time: usize, limit: usize) -> Self {
         let permits = Arc::new(Semaphore::new(at_a_time));
         Self { permits, queue: Arc::default(), at_a_time, limit, limits: None }
     }
 
-    /// The same lane, whose work by [`Self::run_until_dropped`] ends when a step has taken too long.
-    pub(crate) fn within(self, limits: &SharedLimits) -> Self {
+    /// The same lane with a time limit for the work of [`Self::run_until_dropped`].
+    pub(crate) fn with_time_limit(self, limits: &SharedLimits) -> Self {
         Self { limits: Some(Arc::clone(limits)), ..self }
     }
 
-    /// Does `work` when its turn comes; a request that goes away gives its place in the queue back.
+    /// Runs `work` when its turn comes; dropping the request leaves the queue.
     ///
-    /// Once begun, the work counts among those of the lane until it ends, also when the request goes away.
+    /// Work that has started occupies the lane until it ends, even if the request is dropped.
     ///
     /// # Errors
-    /// Those of `work`, a problem when too many are waiting, and one without details when `work` panics.
+    /// Those of `work`, a problem if too many jobs are waiting, and one without details if `work` panics.
     pub(crate) async fn run<T: Send + 'static>(
         &self,
         work: impl FnOnce() -> ApiResult<T> + Send + 'static,
     ) -> ApiResult<T> {
         let permit = {
-            let _place = Place::take(&self.queue, self.limit, &Position::default())?;
+            let _slot = QueueSlot::take(&self.queue, self.limit, &Position::default())?;
             let turn = Arc::clone(&self.permits).acquire_owned();
             turn.await.map_err(|closed| ApiError::internal(closed.to_string()))?
         };
@@ -69,7 +69,7 @@ impl Lane {
         .await
     }
 
-    /// The same for work that looks at a flag, which is set when the request goes away.
+    /// The same for work that checks a flag, which is set when the request is dropped.
     ///
     /// # Errors
     /// As [`Self::run`].
@@ -92,12 +92,12 @@ impl Lane {
         .await
     }
 
-    /// Does `job` in the background when its turn comes, also after the request that submits it.
+    /// Runs `job` in the background when its turn comes, independently of the request that submits it.
     ///
-    /// The end of the program does not wait for it.
+    /// Shutdown does not wait for it.
     ///
     /// # Errors
-    /// A problem when too many are waiting already.
+    /// A problem if too many jobs are waiting.
     pub(crate) fn submit(&self, job: impl FnOnce() + Send + 'static) -> ApiResult<()> {
         let mut job = Some(job);
         let once = move || {
@@ -109,38 +109,38 @@ impl Lane {
         self.submit_by_turns(&Position::default(), once)
     }
 
-    /// The same for a job of many turns: after each it goes to the end of the queue, until it breaks; `position` follows where
-    /// it is in the queue.
+    /// The same for a job of many turns: after each turn it joins the end of the queue, until it breaks; `position` tracks
+    /// its place in the queue.
     ///
     /// # Errors
-    /// A problem when too many are waiting already; later turns always find a place.
+    /// A problem if too many jobs are waiting; later turns always find a place.
     pub(crate) fn submit_by_turns(
         &self,
         position: &Position,
         job: impl FnMut() -> ControlFlow<()> + Send + 'static,
     ) -> ApiResult<()> {
-        self.enqueue(Place::take(&self.queue, self.limit, position)?, Box::new(job))
+        self.enqueue(QueueSlot::take(&self.queue, self.limit, position)?, Box::new(job))
     }
 
-    /// How many jobs are being done.
+    /// Number of running jobs.
     pub(crate) fn running(&self) -> usize {
         self.at_a_time - self.permits.available_permits()
     }
 
-    /// How many jobs are before the one at `position`, those that are being done included; `None` unless it waits.
-    pub(crate) fn before(&self, position: &Position) -> Option<usize> {
-        let place = (*lock(&position.0))?;
-        Some(self.at_a_time + lock(&self.queue.places).waiting.range(..place).count())
+    /// Number of jobs ahead of the one at `position`, including the running ones; `None` unless it waits.
+    pub(crate) fn jobs_ahead(&self, position: &Position) -> Option<usize> {
+        let slot = (*lock(&position.0))?;
+        Some(self.at_a_time + lock(&self.queue.slots).waiting.range(..slot).count())
     }
 
-    /// Starts the next turn of a job when the lane has room.
-    fn enqueue(&self, place: Place, job: Box<Job>) -> ApiResult<()> {
+    /// Starts the next turn of a job once the lane has room.
+    fn enqueue(&self, slot: QueueSlot, job: Box<Job>) -> ApiResult<()> {
         let mut turn: Pin<Box<Turn>> = Box::pin(Arc::clone(&self.permits).acquire_owned());
         // The first poll enters the queue of the semaphore, so that turns start in the order of this call.
         match turn.as_mut().poll(&mut Context::from_waker(Waker::noop())) {
             Poll::Ready(permit) => {
-                let position = place.position.clone();
-                drop(place);
+                let position = slot.position.clone();
+                drop(slot);
                 self.start(permit, position, job)
             }
             Poll::Pending => {
@@ -149,8 +149,8 @@ impl Lane {
                 let lane = self.clone();
                 runtime.spawn(async move {
                     let permit = turn.await;
-                    let position = place.position.clone();
-                    drop(place);
+                    let position = slot.position.clone();
+                    drop(slot);
                     if let Err(problem) = lane.start(permit, position, job) {
                         tracing::error!("a job was not started: {}", problem.problem().detail);
                     }
@@ -160,7 +160,7 @@ impl Lane {
         }
     }
 
-    /// Does a turn of `job` on a thread of its own, and those after it while nobody else waits.
+    /// Runs a turn of `job` on its own thread, and further turns while no other job waits.
     fn start(
         &self,
         permit: Result<OwnedSemaphorePermit, AcquireError>,
@@ -168,7 +168,7 @@ impl Lane {
         mut job: Box<Job>,
     ) -> ApiResult<()> {
         let permit = permit.map_err(|closed| ApiError::internal(closed.to_string()))?;
-        // Jobs submit others when a run is forked or a session is read back.
+        // Jobs submit other jobs when a run is forked or a session is restored.
         let runtime = Handle::try_current().ok();
         let lane = self.clone();
         let work = move || {
@@ -185,10 +185,10 @@ impl Lane {
                     }
                 }
             }
-            // A job that was in the lane already always finds a place.
-            let Some(place) = Place::enter(&lane.queue, usize::MAX, &position) else { return };
+            // A job that is already in the lane always finds a place.
+            let Some(slot) = QueueSlot::enter(&lane.queue, usize::MAX, &position) else { return };
             // The job joins the queue before it gives its permit back; otherwise the next job could finish its turn and overtake it.
-            if let Err(problem) = lane.enqueue(place, job) {
+            if let Err(problem) = lane.enqueue(slot, job) {
                 tracing::error!("a job was not continued: {}", problem.problem().detail);
             }
             drop(permit);
@@ -198,56 +198,56 @@ impl Lane {
     }
 }
 
-/// A turn of a job; whether there are more.
+/// A turn of a job; returns whether to continue.
 type Job = dyn FnMut() -> ControlFlow<()> + Send;
 
-/// Waits for the right to work.
+/// Waits for a permit to run.
 type Turn = dyn Future<Output = Result<OwnedSemaphorePermit, AcquireError>> + Send;
 
-/// What waits in a lane.
+/// The waiting jobs of a lane.
 #[derive(Default)]
 struct Queue {
-    places: Mutex<Places>,
+    slots: Mutex<Slots>,
 }
 
 #[derive(Default)]
-struct Places {
+struct Slots {
     waiting: BTreeSet<u64>,
     next: u64,
 }
 
 impl Queue {
     fn is_empty(&self) -> bool {
-        lock(&self.places).waiting.is_empty()
+        lock(&self.slots).waiting.is_empty()
     }
 }
 
-/// Where a job is in the queue of its lane: the number of its place, `None` unless it waits.
+/// The place number of a job in the queue of its lane; `None` unless it waits.
 #[derive(Clone, Default)]
 pub(crate) struct Position(Arc<Mutex<Option<u64>>>);
 
-/// A place in the queue of a lane, also given back when the request goes away.
-struct Place {
+/// A place in the queue of a lane, released on drop.
+struct QueueSlot {
     queue: Arc<Queue>,
     number: u64,
     position: Position,
 }
 
-impl Place {
+impl QueueSlot {
     fn take(queue: &Arc<Queue>, limit: usize, position: &Position) -> ApiResult<Self> {
         Self::enter(queue, limit, position).ok_or_else(ApiError::busy)
     }
 
-    /// A place behind the others; `None` where `limit` of them wait already.
+    /// Takes the last place; `None` if `limit` jobs are waiting.
     fn enter(queue: &Arc<Queue>, limit: usize, position: &Position) -> Option<Self> {
         let number = {
-            let mut places = lock(&queue.places);
-            if places.waiting.len() >= limit {
+            let mut slots = lock(&queue.slots);
+            if slots.waiting.len() >= limit {
                 return None;
             }
-            let number = places.next;
-            places.next += 1;
-            places.waiting.insert(number);
+            let number = slots.next;
+            slots.next += 1;
+            slots.waiting.insert(number);
             number
         };
         *lock(&position.0) = Some(number);
@@ -255,17 +255,17 @@ impl Place {
     }
 }
 
-impl Drop for Place {
+impl Drop for QueueSlot {
     fn drop(&mut self) {
-        lock(&self.queue.places).waiting.remove(&self.number);
+        lock(&self.queue.slots).waiting.remove(&self.number);
         *lock(&self.position.0) = None;
     }
 }
 
-/// Does `work` on a blocking thread.
+/// Runs `work` on a blocking thread.
 ///
 /// # Errors
-/// Those of `work`, and one without details when it panics.
+/// Those of `work`, and one without details if it panics.
 pub(crate) async fn blocking<T: Send + 'static>(
     work: impl FnOnce() -> ApiResult<T> + Send + 'static,
 ) -> ApiResult<T> {

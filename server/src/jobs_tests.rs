@@ -30,7 +30,7 @@ async fn jobs_start_in_the_order_of_their_submission() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn abandoned_work_keeps_its_permit_and_is_told_to_end() {
+async fn abandoned_work_keeps_its_permit_and_is_cancelled() {
     let lane = Lane::new(1, 8);
     let (begin, mut begun) = tokio::sync::mpsc::unbounded_channel();
     let (release, released) = mpsc::channel::<()>();
@@ -53,10 +53,10 @@ async fn abandoned_work_keeps_its_permit_and_is_told_to_end() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn work_that_takes_too_long_is_told_to_end_and_says_why() {
+async fn overlong_work_is_cancelled_with_a_reason() {
     let mut limits = Limits::default();
     limits.set("step_s=1").unwrap();
-    let lane = Lane::new(1, 1).within(&Arc::new(limits));
+    let lane = Lane::new(1, 1).with_time_limit(&Arc::new(limits));
     let until_told = |cancel: &CancelFlag| {
         while !cancel.load(Ordering::Relaxed) {
             std::thread::sleep(Duration::from_millis(1));
@@ -70,11 +70,11 @@ async fn work_that_takes_too_long_is_told_to_end_and_says_why() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn jobs_of_many_turns_take_turns() {
+async fn multi_turn_jobs_alternate() {
     let lane = Lane::new(1, 8);
     let (sender, receiver) = mpsc::channel();
     let (release, released) = mpsc::channel::<()>();
-    // Nobody begins before all are in the queue.
+    // No job starts before all are in the queue.
     lane.submit(move || released.recv().unwrap()).unwrap();
     for name in ["a", "b", "c"] {
         let (sender, mut turns) = (sender.clone(), 0..3);
@@ -95,7 +95,7 @@ async fn jobs_of_many_turns_take_turns() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_job_that_waits_knows_how_many_are_before_it() {
+async fn a_waiting_job_reports_its_queue_position() {
     let lane = Lane::new(1, 8);
     let (release, released) = mpsc::channel::<()>();
     lane.submit(move || released.recv().unwrap()).unwrap();
@@ -109,11 +109,11 @@ async fn a_job_that_waits_knows_how_many_are_before_it() {
         })
         .unwrap();
     }
-    assert_eq!(positions.each_ref().map(|position| lane.before(position)), [Some(1), Some(2)]);
+    assert_eq!(positions.each_ref().map(|position| lane.jobs_ahead(position)), [Some(1), Some(2)]);
     drop(sender);
     release.send(()).unwrap();
     blocking(move || Ok(receiver.iter().count())).await.unwrap();
-    assert_eq!(positions.each_ref().map(|position| lane.before(position)), [None, None]);
+    assert_eq!(positions.each_ref().map(|position| lane.jobs_ahead(position)), [None, None]);
 }
 
 #[tokio::test]
@@ -124,7 +124,7 @@ async fn a_full_lane_refuses_at_once() {
 }
 
 #[tokio::test]
-async fn a_lane_refuses_what_cannot_wait_and_hides_a_panic() {
+async fn a_lane_rejects_surplus_work_and_hides_a_panic() {
     let lane = Lane::new(1, 1);
     assert_eq!(lane.run(|| Ok(3)).await, Ok(3));
     let problem = lane.run::<()>(|| panic!("secret")).await.unwrap_err();

@@ -6,12 +6,12 @@
 //!                                         └──► jobs ──► runner ────┘ one step at a time
 //! ```
 //!
-//! The order in which to read: [`state`] (what the handlers share), `live_session`, `runner` and `rendering` (how
-//! runs and images come about), `jobs` and `store` (threads and files), `guard`, `extract` and
-//! `problem` (what comes before and after every handler), then `routes` (one file a resource), and [`cli`].
+//! Suggested reading order: [`state`] (shared by the handlers), `live_session`, `runner` and `rendering` (computation of
+//! runs and images), `jobs` and `store` (threads and files), `guard`, `extract` and `problem` (before and after every
+//! handler), then `routes` (one file per resource), and [`cli`].
 //!
-//! Invariants: the reactor computes nothing; GET changes nothing but what can be computed again; names in paths
-//! never become names of files; every number comes from `core::session::track`, for REST and command line alike.
+//! Invariants: the reactor computes nothing; GET changes nothing but caches; names in paths never become file names; every
+//! number comes from `core::session::track`, for REST and the command line.
 
 pub mod state;
 mod live_session;
@@ -24,9 +24,9 @@ mod rendering;
 pub mod naming;
 mod identity;
 mod folders;
-mod driven;
+mod commanded_drive;
 mod drives;
-mod brought;
+mod import_session;
 mod imports;
 mod recordings;
 mod uploads;
@@ -52,7 +52,7 @@ mod idempotency;
 mod extract;
 mod printable;
 mod priority;
-mod requests_first;
+mod request_priority;
 mod problem;
 mod version;
 mod revision;
@@ -75,7 +75,7 @@ use crate::problem::ApiError;
 use crate::routes::{openapi, page};
 use crate::state::AppState;
 
-/// The whole server as a function from requests to answers.
+/// The whole server as a `Router` from requests to answers.
 pub fn app(state: AppState) -> Router {
     let (api, _) = openapi::router().split_for_parts();
     let api = api.fallback(no_route).method_not_allowed_fallback(page::wrong_method);
@@ -89,10 +89,10 @@ pub fn app(state: AppState) -> Router {
         .with_state(state)
         .layer(axum::Extension(limits))
         .layer(CatchPanicLayer::custom(panicked))
-        .layer(middleware::from_fn_with_state(requests, requests_first::count))
+        .layer(middleware::from_fn_with_state(requests, request_priority::count))
         .layer(middleware::from_fn_with_state(access, guard::guard));
     match public {
-        // Layers come after the routing of their router, so that another one around it changes the path.
+        // Layers run after the routing of their router, so an outer router is needed to change the path.
         Some(public) => Router::new()
             .fallback_service(whole)
             .layer(middleware::from_fn_with_state(public, public_url::mount)),
@@ -104,7 +104,7 @@ async fn no_route() -> ApiError {
     ApiError::not_found("There is no such route.").hint("api/v1/openapi.json lists all of them.")
 }
 
-// The signature is that of tower-http.
+// tower-http requires this signature.
 #[allow(clippy::needless_pass_by_value)]
 fn panicked(panic: Box<dyn std::any::Any + Send + 'static>) -> Response {
     let text = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());

@@ -1,11 +1,11 @@
-//! The limits of the server: every bound that a person can move, in one table.
+//! The limits of the server: every configurable bound, in one table.
 //!
-//! `sightline serve --limit NAME=VALUE` moves one; `--limit help` prints the table. A problem that comes from a limit names
-//! it and the option that raises it. Lengths of texts and the ranges of settings are part of the formats, so that they are
-//! constants beside their types.
+//! `sightline serve --limit NAME=VALUE` sets one; `--limit help` prints the table. A problem caused by a limit names it and
+//! the option that raises it. Text lengths and the ranges of settings are part of the formats and therefore constants next
+//! to their types.
 //!
-//! What the server keeps in memory is bounded by `cache_bytes` + `step_bytes` + `answer_bytes`, and by `maps`, `grounds` and
-//! `odometry_tables` (their sizes are in the table). Work in progress comes on top; how much there is at a time is limited, too.
+//! The server's memory is bounded by `cache_bytes` + `step_bytes` + `answer_bytes`, and by `maps`, `grounds` and
+//! `odometry_tables` (their sizes are in the table). Work in progress needs additional memory; its amount is limited, too.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -13,7 +13,7 @@ use std::time::Duration;
 use sightline_api::program::FILE_BYTES;
 use sightline_geometry::error::{Error, Result};
 
-/// The largest value of a limit: far beyond each, and small enough to calculate with.
+/// The largest value of a limit: above any useful one, and small enough to avoid overflow.
 const LARGEST: u64 = 1 << 40;
 
 /// One limit.
@@ -23,27 +23,27 @@ pub(crate) struct Limit {
     pub(crate) name: &'static str,
     /// Its unit.
     unit: &'static str,
-    /// The value unless a person says otherwise.
+    /// The default value.
     default: u64,
-    /// The least value; 0 where 0 means without a limit.
+    /// The smallest value; 0 if 0 means unlimited.
     least: u64,
-    /// What is bounded.
+    /// The bounded quantity.
     meaning: &'static str,
     value: u64,
 }
 
 impl Limit {
-    /// The value as a number of things or bytes.
+    /// The value as a count or a number of bytes.
     pub(crate) fn count(&self) -> usize {
         usize::try_from(self.value).unwrap_or(usize::MAX)
     }
 
-    /// The value as a time; `None` without a limit.
+    /// The value as a duration; `None` if unlimited.
     pub(crate) fn time(&self) -> Option<Duration> {
         (self.value > 0).then(|| Duration::from_secs(self.value))
     }
 
-    /// How to raise it.
+    /// A sentence that explains how to raise it.
     pub(crate) fn raise(&self) -> String {
         let Self { name, unit, value, .. } = self;
         format!(
@@ -52,7 +52,7 @@ impl Limit {
         )
     }
 
-    /// The same as a problem's hint, after another way out.
+    /// `way_out` followed by the text of `raise`, as a problem's hint.
     pub(crate) fn hint(&self, way_out: &str) -> String {
         format!("{way_out} {}", self.raise())
     }
@@ -115,7 +115,7 @@ limits! {
     imports_waiting = 16, 1, "imports", "imports that wait; one is carried out at a time";
     recordings = 200, 1, "recordings", "recordings that are listed below the folders named at start";
     uploads = 4, 1, "uploads", "recordings that pages have sent and not imported yet";
-    upload_bytes = 4 << 30, 1, "bytes", "a recording that a page sends, and what its archive unpacks to";
+    upload_bytes = 4 << 30, 1, "bytes", "a recording that a page sends, and the unpacked contents of its archive";
     upload_files = 50_000, 1, "files", "files of a recording that a page sends";
     stops = 20_000, 1, "stops", "stops of a drive";
     image_pixels = 64_000_000, 1, "pixels", "pixels of an image";
@@ -145,10 +145,10 @@ limits! {
 }
 
 impl Limits {
-    /// Moves a limit by `NAME=VALUE`; values in bytes may end in KiB, MiB or GiB.
+    /// Sets a limit with `NAME=VALUE`; values in bytes may end in KiB, MiB or GiB.
     ///
     /// # Errors
-    /// A name that is none, or a value that is no number or too small.
+    /// An unknown name, or a value that is not a number or is too small.
     pub fn set(&mut self, text: &str) -> Result<()> {
         let (name, value) = text.split_once('=').unwrap_or((text, ""));
         let limit = self.named(name).ok_or_else(|| {
@@ -164,7 +164,7 @@ impl Limits {
         Ok(())
     }
 
-    /// The table, for people.
+    /// The table as text.
     pub fn table(&self) -> String {
         let line = |limit: &&Limit| {
             let Limit { name, unit, default, meaning, .. } = limit;
@@ -174,7 +174,7 @@ impl Limits {
         format!("Limits of the server (--limit NAME=VALUE), with their defaults:\n{lines}")
     }
 
-    /// Refuses a drive that is too large.
+    /// Rejects a drive that is too large.
     ///
     /// # Errors
     /// A sentence that names the limit.
@@ -204,7 +204,7 @@ impl Limits {
     }
 }
 
-/// The number of a text; with a unit of bytes where these are counted.
+/// Parses a number; with a suffix KiB, MiB or GiB if the unit is bytes.
 fn number(text: &str, unit: &str) -> Option<u64> {
     let suffixes = [("KiB", 10), ("MiB", 20), ("GiB", 30)];
     let found = suffixes.iter().find_map(|(suffix, shift)| Some((text.strip_suffix(suffix)?, *shift)));
@@ -214,7 +214,7 @@ fn number(text: &str, unit: &str) -> Option<u64> {
     }
 }
 
-/// The limits that all parts of a server share.
+/// The limits, shared by all parts of the server.
 pub(crate) type SharedLimits = Arc<Limits>;
 
 #[cfg(test)]

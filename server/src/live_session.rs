@@ -1,4 +1,4 @@
-//! A session that people work on: the domain's [`Session`] under a lock, beside what is being computed for it.
+//! A session in use: the domain's [`Session`] behind a lock, with the state of its computations.
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,36 +15,36 @@ use crate::rendering::OpenTraverse;
 use crate::step_memory::StepMemory;
 use crate::store::Store;
 
-/// How many characters the label of a target may have.
+/// Maximum length of a target label, characters.
 pub(crate) const LABEL_LIMIT: usize = 100;
 
 /// A session with its traverse.
 pub struct LiveSession {
     /// Its name in paths.
     pub id: String,
-    /// The traverse; replaced by a longer one after each stop of a drive on commands.
+    /// The traverse; replaced by a longer one after each stop of a commanded drive.
     traverse: RwLock<Arc<OpenTraverse>>,
     session: Mutex<Session>,
     notes: Mutex<Notes>,
-    /// The runs, by target and number, that are computed now or wait for it.
+    /// The runs, by target and number, that are being computed or are queued.
     computing: Mutex<HashMap<(usize, usize), Computing>>,
-    /// Whether it was removed, so that nothing of it is written any more; locked while it is written.
+    /// Whether it was removed, after which nothing is written; locked while it is written.
     removed: Mutex<bool>,
     is_awake: AtomicBool,
     is_restoring: AtomicBool,
     used: Mutex<Option<jiff::Timestamp>>,
-    /// What its steps take.
+    /// Memory of its steps.
     pub(crate) memory: StepMemory,
 }
 
-/// A run that is computed or waits for it.
+/// A run that is being computed or is queued.
 struct Computing {
     flag: CancelFlag,
     position: Position,
 }
 
 impl LiveSession {
-    /// A session; one that was read back sleeps until somebody asks for it.
+    /// A session; a restored one sleeps until its first request.
     pub fn new(mut session: Session, traverse: Arc<OpenTraverse>, is_awake: bool) -> Self {
         session.awaits = traverse.traverse.awaits();
         Self {
@@ -61,40 +61,40 @@ impl LiveSession {
         }
     }
 
-    /// The traverse with its present stops.
+    /// The traverse with the stops so far.
     pub fn traverse(&self) -> Arc<OpenTraverse> {
         Arc::clone(&self.traverse.read().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// Works from now on with the stops that a drive has come to.
+    /// Replaces the traverse by one with more stops.
     pub(crate) fn grow(&self, grown: Arc<OpenTraverse>) {
         let (count, awaits) = (grown.traverse.stop_count(), grown.traverse.awaits());
-        // A step that the session has must be in the traverse.
+        // The traverse is replaced first, because every step of the session must be in it.
         *self.traverse.write().unwrap_or_else(PoisonError::into_inner) = grown;
         self.with(|session| (session.stop_count, session.awaits) = (count, awaits));
     }
 
-    /// Looks at or changes the session; keep it short.
+    /// Reads or changes the session under its lock; `work` must be quick.
     pub fn with<T>(&self, work: impl FnOnce(&mut Session) -> T) -> T {
         work(&mut lock(&self.session))
     }
 
-    /// When something of it was changed or stepped through last.
+    /// Time of the last change or cursor movement.
     pub fn used(&self) -> Option<jiff::Timestamp> {
         *lock(&self.used)
     }
 
-    /// Remembers when it was used last.
+    /// Sets the time of last use.
     pub(crate) fn set_used(&self, used: Option<jiff::Timestamp>) {
         *lock(&self.used) = used;
     }
 
-    /// Changes the session, writes it, and does what follows before anybody uses it again: all or nothing.
+    /// Changes the session, writes it, and calls `then` before the lock is released: all or nothing.
     ///
-    /// The session is locked until it is on disk: a step that is recorded meanwhile would be taken back with the change.
+    /// The session is locked until it is on disk, because undoing the change would also remove steps recorded in between.
     ///
     /// # Errors
-    /// That of `work`, or when the session was removed or the database cannot be written; it is then as it was.
+    /// That of `work`, or when the session was removed or the database cannot be written; the session is then unchanged.
     pub(crate) fn change_and<T>(
         &self,
         store: &Store,
@@ -103,7 +103,7 @@ impl LiveSession {
     ) -> ApiResult<T> {
         let removed = lock(&self.removed);
         if *removed {
-            return Err(is_gone());
+            return Err(removed_error());
         }
         self.with(|session| {
             let before = session.clone();
@@ -119,10 +119,10 @@ impl LiveSession {
         })
     }
 
-    /// Takes the session out of the database for good; says whether it was there.
+    /// Removes the session from the database permanently; returns whether it was there.
     ///
     /// # Errors
-    /// When the database cannot be written; the session is then as it was.
+    /// When the database cannot be written; the session is then unchanged.
     pub(crate) fn remove(&self, store: &Store) -> Result<bool> {
         let mut removed = lock(&self.removed);
         if *removed {
@@ -141,15 +141,15 @@ impl LiveSession {
         *lock(&self.removed)
     }
 
-    /// Looks at or changes the notes; keep it short. Where both are needed, the session comes first.
+    /// Reads or changes the notes under their lock; `work` must be quick. Lock the session before the notes.
     pub(crate) fn with_notes<T>(&self, work: impl FnOnce(&mut Notes) -> T) -> T {
         work(&mut lock(&self.notes))
     }
 
-    /// Changes the notes and writes them: both or nothing.
+    /// Changes the notes and writes them, or neither.
     ///
     /// # Errors
-    /// That of `work`, or when the session was removed or the database cannot be written; they are then as they were.
+    /// That of `work`, or when the session was removed or the database cannot be written; the notes are then unchanged.
     pub(crate) fn change_notes<T>(
         &self,
         store: &Store,
@@ -157,7 +157,7 @@ impl LiveSession {
     ) -> ApiResult<T> {
         let removed = lock(&self.removed);
         if *removed {
-            return Err(is_gone());
+            return Err(removed_error());
         }
         self.with(|session| {
             self.with_notes(|notes| {
@@ -174,27 +174,27 @@ impl LiveSession {
         })
     }
 
-    /// Whether this is the first time that somebody asks for it.
+    /// Marks the session as awake; returns whether it was asleep.
     pub fn wake(&self) -> bool {
         !self.is_awake.swap(true, Ordering::Relaxed)
     }
 
-    /// Says whether the runs of a session that was read back are being computed again.
+    /// Sets whether the runs of a restored session are being recomputed.
     pub(crate) fn set_restoring(&self, is_restoring: bool) {
         self.is_restoring.store(is_restoring, Ordering::Release);
     }
 
-    /// Whether they are.
+    /// Whether the runs of a restored session are being recomputed.
     pub(crate) fn is_restoring(&self) -> bool {
         self.is_restoring.load(Ordering::Acquire)
     }
 
-    /// Lets the next one who asks for it be the first again.
+    /// Marks the session as asleep, so that the next request wakes it.
     pub fn sleep(&self) {
         self.is_awake.store(false, Ordering::Relaxed);
     }
 
-    /// Marks a run as being computed, in place of what may still be ending.
+    /// Marks a run as being computed, and cancels an earlier computation of it.
     pub fn begin(&self, target: usize, run: usize) -> CancelFlag {
         let flag = CancelFlag::default();
         let one = Computing { flag: Arc::clone(&flag), position: Position::default() };
@@ -204,12 +204,12 @@ impl LiveSession {
         flag
     }
 
-    /// Where a run is in the queue; nowhere unless it is being computed.
+    /// The queue position of a run; empty if it is not being computed.
     pub(crate) fn position(&self, target: usize, run: usize) -> Position {
         lock(&self.computing).get(&(target, run)).map_or_else(Position::default, |one| one.position.clone())
     }
 
-    /// Marks a run as not being computed any more, unless it was begun anew.
+    /// Marks a run as not being computed any more, unless it was restarted.
     pub fn end(&self, target: usize, run: usize, flag: &CancelFlag) {
         let mut computing = lock(&self.computing);
         if computing.get(&(target, run)).is_some_and(|present| Arc::ptr_eq(&present.flag, flag)) {
@@ -217,18 +217,18 @@ impl LiveSession {
         }
     }
 
-    /// Whether a run is being computed or waits for it.
+    /// Whether a run is being computed or is queued.
     pub(crate) fn is_computing(&self, target: usize, run: usize) -> bool {
         lock(&self.computing).contains_key(&(target, run))
     }
 
-    /// Whether any run is being computed or waits for it.
+    /// Whether any run is being computed or is queued.
     pub(crate) fn is_computing_any(&self) -> bool {
         !lock(&self.computing).is_empty()
     }
 
-    /// Tells the computation of a run, or of all runs of a target, to end.
-    pub(crate) fn tell_to_end(&self, target: usize, run: Option<usize>) {
+    /// Cancels the computation of a run, or of all runs of a target.
+    pub(crate) fn cancel_runs(&self, target: usize, run: Option<usize>) {
         let computing = lock(&self.computing);
         let meant = computing.iter().filter(|((t, r), _)| *t == target && run.is_none_or(|run| run == *r));
         for (_, one) in meant {
@@ -237,6 +237,6 @@ impl LiveSession {
     }
 }
 
-fn is_gone() -> ApiError {
+fn removed_error() -> ApiError {
     ApiError::not_found("The session was removed meanwhile.")
 }

@@ -1,7 +1,7 @@
-//! The memory of a server: what its parts take, and sessions that give theirs back.
+//! Memory of the server: usage of its parts, and idle sessions that release theirs.
 //!
-//! Steps are computed again from what a person did, so that a session that nobody asks for can rest as after a restart: its
-//! runs lose their steps and are computed when somebody asks for it again, with the same bits.
+//! Steps can be recomputed from the saved session. An idle session can therefore release its steps as after a restart; the
+//! next request recomputes its runs, with the same bits.
 
 use std::convert::Infallible;
 use std::sync::{Arc, Mutex};
@@ -13,20 +13,20 @@ use crate::live_session::LiveSession;
 use crate::sessions::Sessions;
 
 impl LiveSession {
-    /// Measures the memory of the steps anew, after some were added or removed.
+    /// Measures the memory of the steps again, after a change of their number.
     pub(crate) fn measure(&self) {
         let bytes = self.with(|session| session.step_bytes());
         self.memory.set(bytes);
     }
 
-    /// Gives the steps back, unless they are being computed.
-    fn rest(&self) {
+    /// Releases the steps, unless they are being computed.
+    fn release_steps(&self) {
         self.with(|session| {
             if self.is_computing_any() || self.is_restoring() {
                 return;
             }
             if let Ok(light) = session.without_steps() {
-                // Before the lock is given back: whoever asks from now on has the runs computed.
+                // Before the lock is released, so that any later request restarts the runs.
                 self.sleep();
                 *session = light;
                 self.memory.set(0);
@@ -40,9 +40,9 @@ pub(crate) fn of_steps(sessions: &Mutex<Sessions>) -> usize {
     lock(sessions).by_number.values().map(|live| live.memory.bytes()).sum()
 }
 
-/// Whether another step of a session fits into the limit; other sessions rest for it, the one unasked for longest first.
+/// Whether another step of a session fits into the limit; first releases the steps of other sessions, longest idle first.
 pub(crate) fn has_room(sessions: &Mutex<Sessions>, limits: &Limits, live: &LiveSession) -> bool {
-    let (limit, unasked) = (&limits.step_bytes, limits.rest_s.time().unwrap_or_default());
+    let (limit, min_idle) = (&limits.step_bytes, limits.rest_s.time().unwrap_or_default());
     if of_steps(sessions) < limit.count() {
         return true;
     }
@@ -50,32 +50,32 @@ pub(crate) fn has_room(sessions: &Mutex<Sessions>, limits: &Limits, live: &LiveS
         .by_number
         .values()
         .filter(|other| other.id != live.id && other.memory.bytes() > 0)
-        .map(|other| (other.memory.asked(), Arc::clone(other)))
-        .filter(|(asked, _)| asked.elapsed() >= unasked)
+        .map(|other| (other.memory.last_request(), Arc::clone(other)))
+        .filter(|(last_request, _)| last_request.elapsed() >= min_idle)
         .collect();
-    idle.sort_by_key(|(asked, _)| *asked);
+    idle.sort_by_key(|(last_request, _)| *last_request);
     idle.iter().any(|(_, other)| {
-        other.rest();
+        other.release_steps();
         of_steps(sessions) < limit.count()
     })
 }
 
 /// Makes the allocator return freed memory to the system every few seconds, also on an idle server.
 ///
-/// The allocator returns memory a second after it was freed, but only when a thread frees more or ends.
-pub(crate) async fn give_back() -> Infallible {
+/// The allocator returns memory one second after it was freed, but only when a thread frees more or ends.
+pub(crate) async fn return_freed_memory() -> Infallible {
     const PERIOD: Duration = Duration::from_secs(5);
     loop {
         tokio::time::sleep(PERIOD).await;
         let thread = std::thread::Builder::new().name("give-back".to_owned());
-        // Freeing a block of this size makes the allocator look for memory to return.
+        // Freeing a block of this size makes the allocator search for memory to return.
         let freed = || drop(std::hint::black_box(vec![0_u8; 4 << 20]));
-        // If the system starts no thread, the next round tries again.
+        // If no thread can be started, the next round tries again.
         let _ = thread.spawn(freed);
     }
 }
 
-/// Threads and resident memory of this process, bytes, where the system tells.
+/// Number of threads and resident memory, bytes, of this process, if the system reports them.
 pub(crate) fn of_process() -> (Option<u64>, Option<u64>) {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let number = |name: &str| {

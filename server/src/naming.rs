@@ -1,19 +1,19 @@
-//! The names of traverses and folders, and the digest that tells contents apart.
+//! Names of traverses and folders, and the digest that identifies contents.
 
 use sha2::{Digest, Sha256};
 use sightline_geometry::error::{Error, Result};
 use sightline_recordings::Traverse;
 
-/// The part of a traverse's name that follows from its index: readable, and another one when the index is another.
+/// The part of a traverse's name that is derived from its index: readable, and unique to the index.
 ///
 /// # Errors
-/// An index that cannot be written as JSON.
+/// An index that cannot be serialised as JSON.
 pub(crate) fn name_of(traverse: &Traverse) -> Result<String> {
     let index = serde_json::to_vec(traverse.index()).map_err(|error| Error::Request(error.to_string()))?;
     Ok(format!("{}-{}", slug(&traverse.index().name), &hash(&index)[..6]))
 }
 
-/// A name that can be part of a path or a file name: small letters, digits and hyphens.
+/// Converts a name for use in a path or file name: lower-case letters, digits and hyphens.
 pub(crate) fn slug(name: &str) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { ' ' };
     let words: String = name.chars().map(plain).take(60).collect();

@@ -1,4 +1,4 @@
-//! The corners of visual odometry at the stops that were asked for last. No drive stores them: the update is computed again
+//! Caches the corners of visual odometry at the most recently requested stops. No drive stores them; they are recomputed
 //! from the images, which takes about a second.
 
 use std::collections::VecDeque;
@@ -13,13 +13,13 @@ use crate::jobs::lock;
 use crate::limits::SharedLimits;
 use crate::rendering::OpenTraverse;
 
-/// The stops with their corners, the newest last.
+/// The stops with their corners, newest last.
 pub(crate) struct OdometryTables {
-    kept: Mutex<VecDeque<StopTable>>,
+    tables: Mutex<VecDeque<StopTable>>,
     limits: SharedLimits,
 }
 
-/// The odometry of a stop.
+/// The visual odometry of a stop.
 struct StopTable {
     traverse: String,
     step: usize,
@@ -27,9 +27,9 @@ struct StopTable {
 }
 
 impl OdometryTables {
-    /// No stops yet.
+    /// An empty cache.
     pub(crate) fn new(limits: &SharedLimits) -> Self {
-        Self { kept: Mutex::default(), limits: Arc::clone(limits) }
+        Self { tables: Mutex::default(), limits: Arc::clone(limits) }
     }
 
     /// The motion `measured` at a stop, with its corners.
@@ -46,7 +46,7 @@ impl OdometryTables {
         let is_same = |table: &&StopTable| {
             table.traverse == open.id && table.step == step && table.odometry.measured == *measured
         };
-        if let Some(known) = lock(&self.kept).iter().find(is_same) {
+        if let Some(known) = lock(&self.tables).iter().find(is_same) {
             return Ok(Arc::clone(&known.odometry));
         }
         for needed in [step - 1, step] {
@@ -56,15 +56,15 @@ impl OdometryTables {
         let settings = measured.preset.settings();
         let odometry = Arc::new(StopOdometry { settings, measured: measured.clone(), corners });
         let table = StopTable { traverse: open.id.clone(), step, odometry: Arc::clone(&odometry) };
-        let mut kept = lock(&self.kept);
-        kept.push_back(table);
-        let surplus = kept.len().saturating_sub(self.limits.odometry_tables.count());
-        kept.drain(..surplus);
+        let mut tables = lock(&self.tables);
+        tables.push_back(table);
+        let surplus = tables.len().saturating_sub(self.limits.odometry_tables.count());
+        tables.drain(..surplus);
         Ok(odometry)
     }
 
-    /// Forgets everything about a traverse.
+    /// Removes the entries of a traverse.
     pub(crate) fn forget(&self, traverse: &str) {
-        lock(&self.kept).retain(|table| table.traverse != traverse);
+        lock(&self.tables).retain(|table| table.traverse != traverse);
     }
 }

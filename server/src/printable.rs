@@ -1,6 +1,6 @@
-//! Text from outside, made fit for the log.
+//! Sanitises external text for the log and the terminal.
 
-/// `text` without control characters, so that what comes from outside cannot write lines of its own into the log.
+/// `text` with control characters replaced by spaces, so that external text cannot forge lines of the log.
 pub(crate) fn printable(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }

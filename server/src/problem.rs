@@ -1,7 +1,7 @@
-//! What can go wrong with a request, as `application/problem+json` (RFC 9457).
+//! Errors of requests as `application/problem+json` (RFC 9457).
 //!
-//! What the person may see and what the log gets are different strings: a fault of the program says only
-//! that it happened, and its cause goes to the log.
+//! The user and the log get different strings: for an internal error, the answer reports only that it happened; the cause
+//! goes to the log.
 
 use crate::limits::Limit;
 use axum::http::{HeaderValue, StatusCode, header};
@@ -19,7 +19,7 @@ pub(crate) const PROBLEM_JSON: &str = "application/problem+json";
 /// A request that cannot be answered.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ApiError {
-    // In a box, because every result of a handler has room for it.
+    // Boxed, because every result of a handler reserves space for it.
     problem: Box<Problem>,
     place: Option<Box<ProblemPlace>>,
     log: Option<String>,
@@ -29,85 +29,85 @@ pub struct ApiError {
 pub(crate) type ApiResult<T> = Result<T, ApiError>;
 
 impl ApiError {
-    /// A problem of that status; `code` is its stable name for programs.
+    /// A problem with that status; `code` is its stable name for programs.
     pub fn new(status: StatusCode, code: &str, detail: impl Into<String>) -> Self {
         let title = status.canonical_reason().unwrap_or("Problem");
         let problem = Box::new(Problem::new(status.as_u16(), code, title, detail));
         Self { problem, place: None, log: None }
     }
 
-    /// Adds how to mend it.
+    /// Adds advice on how to resolve it.
     #[must_use]
     pub fn hint(mut self, hint: impl Into<String>) -> Self {
         self.problem.hint = Some(hint.into());
         self
     }
 
-    /// Adds the nearest pixel that would do.
+    /// Adds the nearest valid pixel.
     #[must_use]
     pub fn nearest_pixel(mut self, pixel: Pixel) -> Self {
         self.problem.nearest_pixel = Some(Box::new(pixel));
         self
     }
 
-    /// Says which characters of which field are at fault.
+    /// Adds the invalid range of characters in a field.
     #[must_use]
-    pub fn place(mut self, field: &str, from: usize, to: usize) -> Self {
+    pub(crate) fn with_range(mut self, field: &str, from: usize, to: usize) -> Self {
         let position = TextRange { from, to };
         self.place = Some(Box::new(ProblemPlace { field: field.to_owned(), position }));
         self
     }
 
-    /// There is nothing of that name.
+    /// The named resource does not exist.
     pub(crate) fn not_found(detail: impl Into<String>) -> Self {
         Self::new(StatusCode::NOT_FOUND, "not_found", detail)
     }
 
-    /// The request can be read but not be carried out.
+    /// The request is well-formed but cannot be processed.
     pub fn invalid(code: &str, detail: impl Into<String>) -> Self {
         Self::new(StatusCode::UNPROCESSABLE_ENTITY, code, detail)
     }
 
-    /// The state of things does not allow it now.
+    /// The current state does not allow the request.
     pub(crate) fn conflict(detail: impl Into<String>) -> Self {
         Self::new(StatusCode::CONFLICT, "conflict", detail)
     }
 
-    /// It is being made: the same request succeeds soon.
+    /// The result is being prepared: the same request succeeds soon.
     pub(crate) fn awaited(detail: impl Into<String>) -> Self {
         Self::new(StatusCode::ACCEPTED, "awaited", detail)
     }
 
-    /// The request may not come from there.
+    /// Requests from this origin are not allowed.
     pub(crate) fn forbidden(code: &str, detail: impl Into<String>) -> Self {
         Self::new(StatusCode::FORBIDDEN, code, detail)
     }
 
-    /// Too much is waiting already.
+    /// The queue is full.
     pub(crate) fn busy() -> Self {
         Self::new(StatusCode::SERVICE_UNAVAILABLE, "busy", "The server has too much to do already.")
             .hint("Wait until some of it is done, or cancel a run.")
     }
 
-    /// As many things as the limit allows are busy already.
+    /// The number of jobs has reached the limit.
     pub(crate) fn full(limit: &Limit) -> Self {
         Self::busy().hint(limit.hint("Wait until some of it is done, or cancel some."))
     }
 
-    /// A computation took longer than the limit allows.
+    /// A computation exceeded its time limit.
     pub(crate) fn too_long(limit: &Limit) -> Self {
         let detail = format!("The step took longer than {} s.", limit.count());
         Self::invalid("too_long", detail).hint(limit.raise())
     }
 
-    /// A fault of the program; `cause` goes to the log only.
+    /// An internal error; `cause` goes to the log only.
     pub(crate) fn internal(cause: impl Into<String>) -> Self {
         let detail = "The server met a fault of its own; its log says more.";
         let problem = Self::new(StatusCode::INTERNAL_SERVER_ERROR, "internal", detail);
         Self { log: Some(cause.into()), ..problem }
     }
 
-    /// The same problem about something that the path names.
+    /// Converts an invalid request (422) to 404, for a problem with a name in the path.
     #[must_use]
     pub(crate) fn about_path(self) -> Self {
         if self.problem.status == StatusCode::UNPROCESSABLE_ENTITY.as_u16() {
@@ -117,7 +117,7 @@ impl ApiError {
         }
     }
 
-    /// What the person may see.
+    /// The part that is sent to the user.
     pub fn problem(&self) -> &Problem {
         &self.problem
     }
@@ -141,7 +141,7 @@ impl From<Error> for ApiError {
     }
 }
 
-/// How to mend a write that failed.
+/// Advice on how to resolve a failed write.
 fn hint_for(source: &std::io::Error) -> &'static str {
     use std::io::ErrorKind;
     match source.kind() {
@@ -162,7 +162,7 @@ impl IntoResponse for ApiError {
         }
         let status = StatusCode::from_u16(self.problem.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
         let mut response = match self.place {
-            // The place is an extension member of the problem, as RFC 9457 has it.
+            // The place is an extension member of the problem, as RFC 9457 permits.
             Some(place) => {
                 let whole = ExpressionProblem { problem: *self.problem, place: *place };
                 (status, axum::Json(whole)).into_response()
@@ -180,14 +180,15 @@ impl IntoResponse for ApiError {
     }
 }
 
-/// The answer of every route when it cannot do what was asked, for the OpenAPI document.
+/// The default error response of every route, for the OpenAPI document.
 impl IntoResponses for ApiError {
     fn responses() -> Responses {
         documented("default", "What is wrong and how to mend it", Ref::from_schema_name("Problem"))
     }
 }
 
-/// The answer to an expression that cannot be used, for the OpenAPI document: with its place where that is at fault.
+/// The response to an invalid expression, for the OpenAPI document: with the position of the error if the expression is at
+/// fault.
 pub(crate) struct ExpressionRefusal;
 
 impl IntoResponses for ExpressionRefusal {
@@ -198,7 +199,7 @@ impl IntoResponses for ExpressionRefusal {
     }
 }
 
-/// Answers of a status, as problems.
+/// Responses by status.
 type Responses = std::collections::BTreeMap<String, RefOr<utoipa::openapi::Response>>;
 
 fn documented(status: &str, description: &str, schema: impl Into<RefOr<Schema>>) -> Responses {

@@ -1,8 +1,8 @@
 //! The address under which a reverse proxy publishes the server.
 //!
-//! It is a setting and never read from a request: `Forwarded` and `X-Forwarded-*` say whatever their sender likes, and
-//! everything that they could tell is in this address. Both kinds of proxies work: those that remove the path and those that
-//! keep it.
+//! The address is a setting and never read from a request: a client can forge `Forwarded` and `X-Forwarded-*`, and this
+//! address contains the same information. Both kinds of proxies work: those that remove the path prefix and those that keep
+//! it.
 
 use std::fmt;
 
@@ -13,7 +13,7 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Redirect, Response};
 use sightline_geometry::error::{Error, Result};
 
-/// An address of a page: scheme, host, port and folder.
+/// The address of a page: scheme, host, port and folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PublicUrl {
     is_https: bool,
@@ -23,7 +23,7 @@ pub struct PublicUrl {
 }
 
 impl PublicUrl {
-    /// Reads an address such as `https://rover.example/sightline/`.
+    /// Parses an address such as `https://rover.example/sightline/`.
     ///
     /// # Errors
     /// [`Error::Request`] for another form.
@@ -50,7 +50,7 @@ impl PublicUrl {
             return Err(wrong());
         }
         let folder = if path.is_empty() { "/".to_owned() } else { format!("/{path}/") };
-        // Browsers leave out the port that the scheme implies.
+        // Browsers omit the default port of the scheme.
         let implied = if is_https { ":443" } else { ":80" };
         let authority = authority.strip_suffix(implied).unwrap_or(&authority).to_owned();
         Ok(Self { is_https, authority, folder })
@@ -71,7 +71,7 @@ impl PublicUrl {
         self.is_https
     }
 
-    /// The path of a request without the folder, where it begins with it.
+    /// The path of a request without the folder prefix; `None` if it does not have the prefix.
     fn without_folder(&self, path: &PathAndQuery) -> Option<PathAndQuery> {
         let rest = path.as_str().strip_prefix(&self.folder)?;
         format!("/{rest}").parse().ok()
@@ -85,10 +85,10 @@ impl fmt::Display for PublicUrl {
     }
 }
 
-/// Removes the folder from the path of a request, and adds it to the `Location` of the answer.
+/// Removes the folder from the path of a request, and adds it to the `Location` header of the answer.
 pub(crate) async fn mount(State(public): State<PublicUrl>, mut request: Request, next: Next) -> Response {
     if request.method().is_safe() && request.uri().path() == public.folder.trim_end_matches('/') {
-        // The page's own addresses begin where it is.
+        // Relative addresses on the page require the trailing slash.
         return Redirect::permanent(&public.folder).into_response();
     }
     if let Some(rest) = request.uri().path_and_query().and_then(|path| public.without_folder(path)) {

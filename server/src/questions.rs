@@ -1,5 +1,5 @@
-//! The questions that were asked: what would have saved a step. One for each step, kept with its answer, also on disk: one
-//! that was not answered when the server ended goes on when its session is asked for and its runs are computed again.
+//! Counterfactual questions: which changes would have prevented a step's failure? One per step, stored on disk with its
+//! answer. A question that was unanswered at shutdown resumes when its session is requested and its runs are recomputed.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
@@ -16,113 +16,113 @@ use crate::limits::SharedLimits;
 use crate::problem::{ApiError, ApiResult};
 use crate::store::Store;
 
-/// The questions that were asked; the oldest answered ones are forgotten beyond the limit.
+/// The questions; beyond the limit, the oldest answered ones are discarded.
 pub(crate) struct Questions {
-    kept: Mutex<Kept>,
+    contents: Mutex<Contents>,
     limits: SharedLimits,
 }
 
 #[derive(Default)]
-struct Kept {
-    by_step: BTreeMap<AtStep, Arc<Work>>,
+struct Contents {
+    by_step: BTreeMap<AtStep, Arc<QuestionJob>>,
     last_number: u64,
 }
 
-/// A question that is being answered, or was.
-pub(crate) struct Work {
+/// A question, answered or in progress.
+pub(crate) struct QuestionJob {
     number: u64,
     pub(crate) question: Mutex<Question>,
     pub(crate) cancel: CancelFlag,
 }
 
 impl Questions {
-    /// The questions on disk; those without an answer wait for [`Self::waiting_of`].
+    /// Reads the questions from disk; unanswered ones wait for [`Self::waiting_of`].
     ///
     /// # Errors
     /// When the database cannot be read.
-    pub(crate) fn read_back(store: &Store, limits: &SharedLimits) -> Result<Self> {
-        let mut kept = Kept::default();
+    pub(crate) fn load(store: &Store, limits: &SharedLimits) -> Result<Self> {
+        let mut contents = Contents::default();
         for mut question in store.questions()? {
             let Question { session, target, run, step, .. } = question.clone();
             if question.state == QuestionState::Running {
                 question.state = QuestionState::Waiting;
             }
-            kept.last_number += 1;
-            let (number, cancel) = (kept.last_number, CancelFlag::default());
-            let work = Arc::new(Work { number, question: Mutex::new(question), cancel });
-            kept.by_step.insert(AtStep { session, target, run, step }, work);
+            contents.last_number += 1;
+            let (number, cancel) = (contents.last_number, CancelFlag::default());
+            let job = Arc::new(QuestionJob { number, question: Mutex::new(question), cancel });
+            contents.by_step.insert(AtStep { session, target, run, step }, job);
         }
-        Ok(Self { kept: Mutex::new(kept), limits: Arc::clone(limits) })
+        Ok(Self { contents: Mutex::new(contents), limits: Arc::clone(limits) })
     }
 
-    /// The questions of a session that wait.
-    pub(crate) fn waiting_of(&self, session: &str) -> Vec<(AtStep, Arc<Work>)> {
-        let waits = |work: &Work| lock(&work.question).state == QuestionState::Waiting;
-        let kept = lock(&self.kept);
-        let of_session = kept.by_step.iter().filter(|(path, work)| path.session == session && waits(work));
-        of_session.map(|(path, work)| (path.clone(), Arc::clone(work))).collect()
+    /// The waiting questions of a session.
+    pub(crate) fn waiting_of(&self, session: &str) -> Vec<(AtStep, Arc<QuestionJob>)> {
+        let waits = |job: &QuestionJob| lock(&job.question).state == QuestionState::Waiting;
+        let contents = lock(&self.contents);
+        let of_session = contents.by_step.iter().filter(|(path, job)| path.session == session && waits(job));
+        of_session.map(|(path, job)| (path.clone(), Arc::clone(job))).collect()
     }
 
-    pub(crate) fn find(&self, path: &AtStep) -> ApiResult<Arc<Work>> {
-        let found = lock(&self.kept).by_step.get(path).cloned();
+    pub(crate) fn find(&self, path: &AtStep) -> ApiResult<Arc<QuestionJob>> {
+        let found = lock(&self.contents).by_step.get(path).cloned();
         found.ok_or_else(|| {
             ApiError::not_found("Nobody has asked what would have saved this step.")
                 .hint("POST to the same path asks it.")
         })
     }
 
-    /// The work on a question; none where it goes on or is answered already.
-    pub(crate) fn begin(&self, path: AtStep, store: &Store) -> ApiResult<(Arc<Work>, bool)> {
-        let mut kept = lock(&self.kept);
-        let state_of = |work: &Work| lock(&work.question).state;
-        if let Some(work) = kept.by_step.get(&path) {
-            if !matches!(state_of(work), QuestionState::Cancelled | QuestionState::Failed) {
-                return Ok((Arc::clone(work), false));
+    /// The work on a question, and whether the caller must start it: false if it is in progress or answered.
+    pub(crate) fn begin(&self, path: AtStep, store: &Store) -> ApiResult<(Arc<QuestionJob>, bool)> {
+        let mut contents = lock(&self.contents);
+        let state_of = |job: &QuestionJob| lock(&job.question).state;
+        if let Some(job) = contents.by_step.get(&path) {
+            if !matches!(state_of(job), QuestionState::Cancelled | QuestionState::Failed) {
+                return Ok((Arc::clone(job), false));
             }
-        } else if kept.by_step.len() >= self.limits.questions.count() {
-            let over = kept.by_step.iter().filter(|(_, work)| state_of(work).is_over());
-            let oldest = over.min_by_key(|(_, work)| work.number).map(|(path, _)| path.clone());
+        } else if contents.by_step.len() >= self.limits.questions.count() {
+            let over = contents.by_step.iter().filter(|(_, job)| state_of(job).is_over());
+            let oldest = over.min_by_key(|(_, job)| job.number).map(|(path, _)| path.clone());
             let oldest = oldest.ok_or_else(|| ApiError::full(&self.limits.questions))?;
-            if let Some(work) = kept.by_step.remove(&oldest) {
-                store.forget_question(&work.view());
+            if let Some(job) = contents.by_step.remove(&oldest) {
+                store.forget_question(&job.view());
             }
         }
-        kept.last_number += 1;
+        contents.last_number += 1;
         let AtStep { session, target, run, step } = path.clone();
         let state = QuestionState::Waiting;
         let question = Question { session, target, run, step, state, answer: None, problem: None };
-        let (number, cancel) = (kept.last_number, CancelFlag::default());
+        let (number, cancel) = (contents.last_number, CancelFlag::default());
         store.save_question(&question)?;
-        let work = Arc::new(Work { number, question: Mutex::new(question), cancel });
-        kept.by_step.insert(path, Arc::clone(&work));
-        Ok((work, true))
+        let job = Arc::new(QuestionJob { number, question: Mutex::new(question), cancel });
+        contents.by_step.insert(path, Arc::clone(&job));
+        Ok((job, true))
     }
 
-    /// Forgets the questions of a session; those that are being answered end.
+    /// Removes the questions of a session and cancels those in progress.
     pub(crate) fn forget_session(&self, session: &str) {
-        lock(&self.kept).by_step.retain(|path, work| {
+        lock(&self.contents).by_step.retain(|path, job| {
             let is_kept = path.session != session;
             if !is_kept {
-                work.cancel.store(true, Ordering::Relaxed);
+                job.cancel.store(true, Ordering::Relaxed);
             }
             is_kept
         });
     }
 
-    /// Forgets a question that nobody can answer now.
+    /// Removes a question that cannot be answered.
     pub(crate) fn forget(&self, path: &AtStep, store: &Store) {
-        if let Some(work) = lock(&self.kept).by_step.remove(path) {
-            store.forget_question(&work.view());
+        if let Some(job) = lock(&self.contents).by_step.remove(path) {
+            store.forget_question(&job.view());
         }
     }
 }
 
-impl Work {
+impl QuestionJob {
     pub(crate) fn view(&self) -> Question {
         lock(&self.question).clone()
     }
 
-    /// Changes the question, unless it has ended.
+    /// Changes the question unless it has ended; returns whether it was changed.
     pub(crate) fn change(&self, change: impl FnOnce(&mut Question)) -> bool {
         let mut question = lock(&self.question);
         let goes_on = !question.state.is_over();
@@ -132,7 +132,7 @@ impl Work {
         goes_on
     }
 
-    /// How far the answer has come.
+    /// The progress of the answer.
     pub(crate) fn progress(&self) -> Event {
         let view = self.view();
         let (k, n) = view.answer.as_ref().map_or((0, 0), |answer| (answer.k, answer.n));

@@ -1,4 +1,4 @@
-//! A recorded step with the steps that computing it again needs.
+//! A recorded step with the earlier steps needed to recompute it.
 
 use std::sync::Arc;
 
@@ -18,29 +18,29 @@ use crate::problem::{ApiError, ApiResult};
 use crate::runner;
 use crate::state::AppState;
 
-/// A recorded step with what came before it.
+/// A recorded step with its predecessors.
 pub(crate) struct RecordedStep {
     /// The session.
     pub live: Arc<LiveSession>,
-    /// The run's designation.
+    /// The first step of the run, with the designation.
     pub first: Arc<RunStep>,
-    /// The step before; none at the designation.
+    /// The previous step; `None` at the designation.
     pub last: Option<Arc<RunStep>>,
     /// The step.
     pub recorded: Arc<RunStep>,
-    /// The numbers of its target and run.
+    /// The indices of its target and run.
     of: (usize, usize),
     /// The run's configuration.
     pub settings: Arc<Settings>,
-    /// Where a person put its prediction in the left image, px.
+    /// The prediction in the left image, px, if the user moved it.
     pub prediction_px: Option<Pixel>,
 }
 
 impl RecordedStep {
-    /// The recorded step that the path names.
+    /// The recorded step named in the path.
     ///
     /// # Errors
-    /// A problem when there is none.
+    /// A problem if it does not exist.
     pub(crate) fn find(state: &AppState, at: &AtStep) -> ApiResult<Self> {
         let live = state.session(&at.session)?;
         let found = live.with(|session| {
@@ -61,12 +61,12 @@ impl RecordedStep {
         Ok(Self { live, first, last, recorded, of: (at.target, at.run), settings, prediction_px })
     }
 
-    /// Makes the step ready to be computed again: its images rendered, the template's image back in place.
+    /// Prepares the step for recomputation: renders its images and restores the template's image.
     ///
     /// # Errors
-    /// Those of the files.
+    /// Errors of reading or rendering images.
     pub(crate) fn prepare(&mut self, cancel: &CancelFlag) -> ApiResult<()> {
-        // A step of a paused drive is computed again up to the pause.
+        // A step of a paused drive is recomputed up to the pause.
         if self.recorded.paused_before().is_none_or(|before| before > CycleStage::Capture) {
             let camera = self.recorded.update.target.designation.camera;
             self.live.traverse().make_camera_ready(self.recorded.step, camera, cancel)?;
@@ -77,18 +77,18 @@ impl RecordedStep {
         Ok(())
     }
 
-    /// What its stages take on Mars, and took here.
+    /// Duration of its stages on Mars and on this machine.
     pub(crate) fn times(&self) -> Vec<StageTime> {
         let open = self.live.traverse();
         let report = |world: &DrivenTraverse| world.report(self.recorded.step + 1);
-        let report = open.driven.as_ref().and_then(|driven| driven.with(report));
+        let report = open.commanded.as_ref().and_then(|drive| drive.with(report));
         times(&self.recorded, report.map(|report| report.duration_s))
     }
 
-    /// The step's view against the first and the newest `count` templates of its run before it, oldest first (R72).
+    /// Compares the step's view with the first and the newest `count` earlier templates of its run, oldest first (R72).
     ///
     /// # Errors
-    /// Those of the images.
+    /// Errors of reading or rendering images.
     pub(crate) fn against_earlier(&self, count: usize) -> ApiResult<Vec<AgainstEarlier>> {
         if self.recorded.located().is_none_or(|located| located.left_pixel.is_none()) {
             return Ok(Vec::new());
@@ -99,8 +99,9 @@ impl RecordedStep {
             traverse.capture_one(self.recorded.step, self.recorded.update.target.designation.camera, true)?;
         let renewals = self.renewals()?;
         let oldest = renewals.len().saturating_sub(count);
-        let kept = renewals.iter().enumerate().filter(|(i, _)| *i == 0 || *i >= oldest).map(|(_, step)| step);
-        let steps = kept
+        let recent =
+            renewals.iter().enumerate().filter(|(i, _)| *i == 0 || *i >= oldest).map(|(_, step)| step);
+        let steps = recent
             .map(|step| runner::with_image(&self.live.traverse(), step))
             .collect::<Result<Vec<_>, _>>()?;
         let earlier = steps.iter().filter_map(|step| step.update.target.memory.template());
@@ -113,7 +114,7 @@ impl RecordedStep {
         ))
     }
 
-    /// The steps before it that took a new template, the designation first.
+    /// The earlier steps that took a new template, designation first.
     fn renewals(&self) -> ApiResult<Vec<Arc<RunStep>>> {
         self.live.with(|session| {
             let steps = &session.run(self.of.0, self.of.1)?.steps;
@@ -122,7 +123,7 @@ impl RecordedStep {
         })
     }
 
-    /// From what the step is computed again.
+    /// The input for recomputing the step.
     pub(crate) fn base(&self) -> Base<'_> {
         Base {
             first: &self.first,

@@ -1,6 +1,6 @@
-//! Recordings that pages may open by their path: below the folders that were named at the server's start, and no others.
+//! Recordings that pages may open by path: only below the folders named at the server's start.
 //!
-//! A path is resolved with all its links before it is compared, and no link inside a recording may lead out of that folder.
+//! Paths are compared after all links are resolved, and no link inside a recording may lead out of that folder.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -14,35 +14,35 @@ use crate::limits::Limits;
 use crate::problem::{ApiError, ApiResult};
 use crate::state::AppState;
 
-/// How many folders below a named one recordings are looked for.
+/// Maximum depth of recordings below a named folder.
 const DEPTH: usize = 4;
-/// Stops at the beginning whose stereo pairs are shown.
+/// Number of first stops whose stereo pairs are shown.
 const PAIRS_SHOWN: usize = 3;
 
-/// A path that may be opened.
+/// A path that pages may open.
 #[derive(Clone, Debug)]
 pub(crate) struct Confined {
     /// The recording, with all links resolved.
     pub(crate) path: PathBuf,
-    /// The named folder, or that of the upload, that it is in.
+    /// The named folder or upload folder that contains it.
     root: PathBuf,
-    /// Whether it was sent by a page.
+    /// Whether it was uploaded by a page.
     pub(crate) is_upload: bool,
 }
 
 impl Confined {
-    /// The folder that nothing of the recording may leave.
+    /// The folder that confines the recording.
     pub(crate) fn root(&self) -> &Path {
         &self.root
     }
 
-    /// How the recording is imported.
+    /// The options for importing the recording.
     pub(crate) fn options(&self) -> ImportOptions {
         ImportOptions { within: Some(self.root.clone()), ..ImportOptions::default() }
     }
 }
 
-/// The recordings below the named folders.
+/// Lists the recordings below the named folders.
 pub(crate) fn list(folders: &Folders, limits: &Limits) -> RecordingList {
     let mut list = RecordingList { is_complete: true, ..RecordingList::default() };
     for root in &folders.recordings {
@@ -59,10 +59,10 @@ pub(crate) fn list(folders: &Folders, limits: &Limits) -> RecordingList {
     list
 }
 
-/// Resolves the path that a page named.
+/// Resolves the path requested by a page.
 ///
 /// # Errors
-/// A problem when no folder was named, or the path is not below one.
+/// A problem if no folder was named, or the path is outside the named folders.
 pub(crate) fn confine(state: &AppState, path: &str) -> ApiResult<Confined> {
     let real = Path::new(path).canonicalize().ok().filter(|_| Path::new(path).is_absolute());
     let sent = real.and_then(|real| Some((state.uploads().root_of(&real)?, real)));
@@ -72,7 +72,7 @@ pub(crate) fn confine(state: &AppState, path: &str) -> ApiResult<Confined> {
     }
 }
 
-/// The recording itself where a path names a folder around one.
+/// Descends from a folder to the only recording in it.
 fn only_one(confined: Confined) -> ApiResult<Confined> {
     if !confined.path.is_dir() {
         return Ok(confined);
@@ -89,7 +89,7 @@ fn only_one(confined: Confined) -> ApiResult<Confined> {
     }
 }
 
-/// Resolves a path below the named folders.
+/// Resolves a path relative to the named folders.
 ///
 /// # Errors
 /// As [`confine`].
@@ -107,7 +107,7 @@ pub(crate) fn confine_named(folders: &Folders, path: &str) -> ApiResult<Confined
             "Start it with `sightline serve --recordings FOLDER`, where FOLDER contains the recording.",
         ));
     }
-    // A relative path is one below a named folder; an absolute one replaces it.
+    // Joining a relative path to a folder appends it; an absolute path replaces the folder.
     let found = folders.recordings.iter().find_map(|folder| {
         let real = folder.join(path).canonicalize().ok()?;
         let root = folders.recordings.iter().find(|root| real.starts_with(root))?.clone();
@@ -123,10 +123,10 @@ pub(crate) fn confine_named(folders: &Folders, path: &str) -> ApiResult<Confined
     })
 }
 
-/// What the recording at a path contains.
+/// The contents of the recording at a path.
 ///
 /// # Errors
-/// A problem that names the file and what is wrong with it.
+/// A problem that names the file and the fault.
 pub(crate) fn contents(
     recording: &Confined,
     limits: &Limits,
@@ -165,7 +165,7 @@ pub(crate) fn contents(
     })
 }
 
-/// The problem of a recording that cannot be opened.
+/// The problem for a recording that cannot be opened.
 pub(crate) fn refusal(error: sightline_geometry::error::Error) -> ApiError {
     let error = ApiError::from(error);
     let is_unknown = error.problem().detail.contains("is of no known format");

@@ -1,8 +1,7 @@
-//! Rendering of simulated stops: one at a time for each traverse, what a person waits for first.
+//! Renders simulated stops: one at a time for each traverse, requested stops first.
 //!
-//! A render in the background gives way to one in the foreground, except when both are of the same stop, for
-//! which the latter then waits. Renders have a thread pool of their own, because in the tracker's pool a step
-//! would wait behind the pixels of a whole image.
+//! A background render yields to a requested one, except for the same stop, for which the request then waits. Renders have
+//! their own thread pool, because in the tracker's pool a step would wait for the pixels of a whole image.
 
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,23 +14,23 @@ use sightline_geometry::error::{Error, Result};
 use sightline_recordings::Traverse;
 use tokio::sync::broadcast;
 
-use crate::driven::Driven;
+use crate::commanded_drive::CommandedDrive;
 use crate::identity::Identity;
 use crate::jobs::lock;
 
-/// How soon a cancelled wait is noticed.
-const GLANCE: Duration = Duration::from_millis(50);
+/// Polling interval of the cancel flag while waiting.
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// An opened traverse with the turn to render its stops.
+/// An opened traverse, with the lock for rendering its stops.
 pub struct OpenTraverse {
     /// Its name in paths.
     pub id: String,
     /// The traverse.
     pub traverse: Traverse,
-    /// From which its name follows.
+    /// The identity that determines its name.
     pub(crate) identity: Identity,
-    /// The world of a drive on commands.
-    pub(crate) driven: Option<Arc<Driven>>,
+    /// The world of a commanded drive.
+    pub(crate) commanded: Option<Arc<CommandedDrive>>,
     is_closed: AtomicBool,
     turn: Mutex<Turn>,
     turned: Condvar,
@@ -42,32 +41,32 @@ pub struct OpenTraverse {
 struct Turn {
     /// The stop that is being rendered.
     step: Option<usize>,
-    /// How to stop it, when it is a render in the background.
+    /// Cancels it, if it is a background render.
     yields: Option<Arc<AtomicBool>>,
-    /// How many renders in the foreground are waiting.
+    /// Number of waiting requests.
     urgent: usize,
 }
 
 impl OpenTraverse {
-    /// A traverse under the name of its identity; its progress is told to `events`.
+    /// A traverse named by its identity, which reports progress to `events`.
     pub(crate) fn new(identity: Identity, traverse: Traverse, events: broadcast::Sender<Event>) -> Self {
         let id = identity.id();
         let (is_closed, turn, turned) = (AtomicBool::new(false), Mutex::default(), Condvar::new());
-        Self { id, traverse, identity, driven: None, is_closed, turn, turned, events }
+        Self { id, traverse, identity, commanded: None, is_closed, turn, turned, events }
     }
 
-    /// The traverse of a drive on commands in this world.
-    pub(crate) fn driven_in(self, driven: Arc<Driven>) -> Self {
-        Self { driven: Some(driven), ..self }
+    /// The traverse of a commanded drive in this world.
+    pub(crate) fn in_world_of(self, drive: Arc<CommandedDrive>) -> Self {
+        Self { commanded: Some(drive), ..self }
     }
 
     /// The same drive with more stops.
     pub(crate) fn grown(&self, traverse: Traverse) -> Self {
         let grown = Self::new(self.identity.clone(), traverse, self.events.clone());
-        Self { driven: self.driven.clone(), ..grown }
+        Self { commanded: self.commanded.clone(), ..grown }
     }
 
-    /// Renders nothing any more, because the traverse is removed.
+    /// Stops further rendering, because the traverse is removed.
     pub(crate) fn close(&self) {
         self.is_closed.store(true, Ordering::Relaxed);
     }
@@ -77,7 +76,7 @@ impl OpenTraverse {
         self.is_closed.load(Ordering::Relaxed)
     }
 
-    /// Makes sure that the images of a stop's main pair are there; a recorded stop is always ready.
+    /// Ensures that the images of a stop's main pair exist; a recorded stop is always ready.
     ///
     /// # Errors
     /// As [`Traverse::render_step`]; [`Error::Cancelled`] soon after `cancel` is set.
@@ -85,7 +84,7 @@ impl OpenTraverse {
         self.make_camera_ready(step, None, cancel)
     }
 
-    /// The same for the main pair or a further camera; a stop that lacks the camera is ready.
+    /// The same for the main pair or a further camera; a stop without the camera is ready.
     ///
     /// # Errors
     /// As [`Self::make_ready`].
@@ -102,15 +101,15 @@ impl OpenTraverse {
         self.render(step, camera, cancel)
     }
 
-    /// The same in the background: gives way to [`Self::make_ready`] with [`Error::Cancelled`].
+    /// The same in the background; returns [`Error::Cancelled`] when it yields to [`Self::make_ready`].
     fn make_ready_in_background(&self, step: usize, cancel: &Arc<AtomicBool>) -> Result<()> {
         self.take_turn(step, cancel, Some(cancel))?;
         self.render(step, None, cancel)
     }
 
-    /// How many stops are ready, and whether `ready` has just become so.
+    /// The number of ready stops; `ready` is a stop that has just become ready.
     pub fn progress(&self, ready: Option<usize>) -> Event {
-        // A stop without images yet is none that is rendered.
+        // A stop whose images are pending does not count.
         let n = self.traverse.stop_count() - usize::from(self.traverse.awaits().is_some());
         let k = (0..n).filter(|&step| self.traverse.is_ready(step)).count();
         Event::RenderProgress { traverse: self.id.clone(), k, n, ready }
@@ -136,13 +135,13 @@ impl OpenTraverse {
             {
                 background.store(true, Ordering::Relaxed);
             }
-            turn = self.turned.wait_timeout(turn, GLANCE).unwrap_or_else(PoisonError::into_inner).0;
+            turn = self.turned.wait_timeout(turn, POLL_INTERVAL).unwrap_or_else(PoisonError::into_inner).0;
         };
         turn.urgent -= usize::from(yields.is_none());
         taken
     }
 
-    /// Renders in this thread's turn, which ends here, also by a panic.
+    /// Renders while this thread has the turn, which ends here, even after a panic.
     fn render(&self, step: usize, camera: Option<CameraName>, cancel: &AtomicBool) -> Result<()> {
         let _turn = EndOfTurn(self);
         if self.is_ready(step, camera) {
@@ -154,7 +153,7 @@ impl OpenTraverse {
             None => render(),
         }?;
         if camera.is_none() {
-            // Nobody may be listening.
+            // An error only means that there are no subscribers.
             let _ = self.events.send(self.progress(Some(step)));
         }
         Ok(())
@@ -171,56 +170,56 @@ impl Drop for EndOfTurn<'_> {
     }
 }
 
-/// The threads that render; none where the system refuses them, and then the tracker's pool has to do.
+/// The threads for rendering; `None` if they cannot be started, in which case the tracker's pool is used.
 fn pool() -> Option<&'static rayon::ThreadPool> {
     static POOL: OnceLock<Option<rayon::ThreadPool>> = OnceLock::new();
     let name = |number| format!("render-{number}");
     POOL.get_or_init(|| rayon::ThreadPoolBuilder::new().thread_name(name).build().ok()).as_ref()
 }
 
-/// The background thread that renders the stops ahead of where a person looks.
-pub(crate) struct Ahead {
-    wish: Mutex<Wish>,
+/// The background thread that renders the stops after the cursor.
+pub(crate) struct Prefetcher {
+    request: Mutex<PrefetchRequest>,
     changed: Condvar,
 }
 
 #[derive(Default)]
-struct Wish {
-    /// The traverse that is looked at.
+struct PrefetchRequest {
+    /// The traverse on display.
     traverse: Weak<OpenTraverse>,
-    /// The stop that is looked at.
+    /// The stop on display.
     from: usize,
-    /// Stops that could not be rendered.
+    /// Stops with a rendering error.
     failed: BTreeSet<(String, usize)>,
-    /// How to stop the present render.
+    /// Cancels the current render.
     cancel: Arc<AtomicBool>,
     closed: bool,
 }
 
-impl Ahead {
+impl Prefetcher {
     /// Starts the thread.
     ///
     /// # Errors
-    /// When the system starts no thread.
+    /// When the system cannot start the thread.
     pub(crate) fn start() -> std::io::Result<Arc<Self>> {
-        let ahead = Arc::new(Self { wish: Mutex::default(), changed: Condvar::new() });
-        let own = Arc::clone(&ahead);
+        let prefetcher = Arc::new(Self { request: Mutex::default(), changed: Condvar::new() });
+        let own = Arc::clone(&prefetcher);
         std::thread::Builder::new().name("render-ahead".to_owned()).spawn(move || own.work())?;
-        Ok(ahead)
+        Ok(prefetcher)
     }
 
-    /// From now on the stops of `traverse` from `from` on come first, then those before.
-    pub(crate) fn look_at(&self, traverse: &Arc<OpenTraverse>, from: usize) {
-        let mut wish = lock(&self.wish);
-        (wish.traverse, wish.from) = (Arc::downgrade(traverse), from);
+    /// Renders the stops of `traverse` from `from` onwards first, then the earlier ones.
+    pub(crate) fn prefetch_from(&self, traverse: &Arc<OpenTraverse>, from: usize) {
+        let mut request = lock(&self.request);
+        (request.traverse, request.from) = (Arc::downgrade(traverse), from);
         self.changed.notify_all();
     }
 
     /// Ends the thread soon.
     pub(crate) fn close(&self) {
-        let mut wish = lock(&self.wish);
-        wish.closed = true;
-        wish.cancel.store(true, Ordering::Relaxed);
+        let mut request = lock(&self.request);
+        request.closed = true;
+        request.cancel.store(true, Ordering::Relaxed);
         self.changed.notify_all();
     }
 
@@ -234,25 +233,25 @@ impl Ahead {
                 Err(_) => "the renderer panicked".to_owned(),
             };
             tracing::warn!(step, "cannot render ahead: {}", crate::printable::printable(&why));
-            lock(&self.wish).failed.insert((traverse.id.clone(), step));
+            lock(&self.request).failed.insert((traverse.id.clone(), step));
         }
     }
 
-    /// Waits for the next stop to render; none when the thread shall end.
+    /// Waits for the next stop to render; `None` when the thread must end.
     fn next(&self) -> Option<(Arc<OpenTraverse>, usize, Arc<AtomicBool>)> {
-        let mut wish = lock(&self.wish);
-        while !wish.closed {
-            if let Some((traverse, step)) = wish.pick() {
-                wish.cancel = Arc::default();
-                return Some((traverse, step, Arc::clone(&wish.cancel)));
+        let mut request = lock(&self.request);
+        while !request.closed {
+            if let Some((traverse, step)) = request.pick() {
+                request.cancel = Arc::default();
+                return Some((traverse, step, Arc::clone(&request.cancel)));
             }
-            wish = self.changed.wait(wish).unwrap_or_else(PoisonError::into_inner);
+            request = self.changed.wait(request).unwrap_or_else(PoisonError::into_inner);
         }
         None
     }
 }
 
-impl Wish {
+impl PrefetchRequest {
     fn pick(&self) -> Option<(Arc<OpenTraverse>, usize)> {
         let traverse = self.traverse.upgrade()?;
         let count = traverse.traverse.stop_count();

@@ -1,5 +1,5 @@
-//! A name for every request, by which a person's report finds the log's lines: in every problem beside the time, and there
-//! as the header `x-request-id`, too.
+//! An identifier for every request, which links a user's report to the log. Every problem contains it with the time, and
+//! also in the header `x-request-id`.
 
 use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -12,24 +12,24 @@ use serde_json::{Map, Value};
 use crate::clock;
 use crate::problem::PROBLEM_JSON;
 
-/// More than any problem has, bytes.
+/// Upper bound on the size of a problem, bytes.
 const PROBLEM_LIMIT: usize = 1 << 20;
 
-/// The next name: when the program started, and a number.
+/// A new identifier: the start time of the program and a counter.
 pub(crate) fn next() -> String {
     static STARTED: LazyLock<i64> = LazyLock::new(|| jiff::Timestamp::now().as_second());
     static COUNT: AtomicU64 = AtomicU64::new(1);
     format!("{:x}-{}", *STARTED, COUNT.fetch_add(1, Ordering::Relaxed))
 }
 
-/// A problem with the name of its request; every other answer as it is, so that the same question has the same answer.
-pub(crate) async fn told(response: Response<Body>, id: &str) -> Response<Body> {
+/// Adds the identifier to a problem; other answers are unchanged, so that the same request has the same answer.
+pub(crate) async fn add_to_problem(response: Response<Body>, id: &str) -> Response<Body> {
     let is_problem = response.headers().get(header::CONTENT_TYPE).is_some_and(|kind| kind == PROBLEM_JSON);
     if !is_problem {
         return response;
     }
     let (mut parts, body) = response.into_parts();
-    // Problems are made in memory, so that they arrive whole.
+    // Problems are created in memory, so the body is complete.
     let bytes = to_bytes(body, PROBLEM_LIMIT).await.unwrap_or_default();
     let bytes = match serde_json::from_slice::<Map<String, Value>>(&bytes) {
         Ok(mut problem) => {

@@ -1,4 +1,4 @@
-//! `If-Match`: which revision of a thing a person has read before changing it, so that nobody's words are lost.
+//! `If-Match`: the revision that a client has read before changing a resource, to prevent lost updates.
 
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
@@ -8,8 +8,8 @@ use axum::response::{IntoResponse, Response};
 use crate::naming::hash;
 use crate::problem::{ApiError, ApiResult};
 
-/// The revision that was read: `If-Match: "3"`; `If-Match: *` is none, whichever it is; `If-None-Match: *` is 0, a thing
-/// that is not there yet.
+/// The revision that was read: `If-Match: "3"` is 3; `If-Match: *` is `None`, any revision; `If-None-Match: *` is 0, a
+/// resource that does not exist yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Read(pub Option<u64>);
 
@@ -22,8 +22,8 @@ impl<S: Send + Sync> FromRequestParts<S> for Read {
 }
 
 fn read(headers: &HeaderMap) -> ApiResult<Read> {
-    let said = |name| headers.get(name).map(|value| value.to_str().unwrap_or_default().trim().to_owned());
-    match (said(header::IF_MATCH), said(header::IF_NONE_MATCH)) {
+    let value_of = |name| headers.get(name).map(|value| value.to_str().unwrap_or_default().trim().to_owned());
+    match (value_of(header::IF_MATCH), value_of(header::IF_NONE_MATCH)) {
         (_, Some(other)) if other != "*" => Err(ApiError::invalid(
             "if_none_match",
             "If-None-Match: must be *, for a thing that is not there yet",
@@ -47,12 +47,12 @@ fn read(headers: &HeaderMap) -> ApiResult<Read> {
     }
 }
 
-/// The header that tells a revision.
+/// The ETag header of a revision.
 pub(crate) fn tag(revision: u64) -> [(header::HeaderName, String); 1] {
     [(header::ETAG, format!("\"{revision}\""))]
 }
 
-/// An answer with an ETag of its contents, or 304 where the reader has it already.
+/// An answer with an ETag of its contents, or 304 if the client has the same version.
 pub(crate) fn unless_known(headers: &HeaderMap, media_type: &'static str, body: Vec<u8>) -> Response {
     let tag = format!("\"{}\"", &hash(&body)[..32]);
     let known = headers.get(header::IF_NONE_MATCH).and_then(|value| value.to_str().ok());
@@ -63,7 +63,7 @@ pub(crate) fn unless_known(headers: &HeaderMap, media_type: &'static str, body: 
     ([(header::CONTENT_TYPE, media_type)], caching, body).into_response()
 }
 
-/// Somebody changed it meanwhile.
+/// The problem of a conflicting change by another client.
 pub(crate) fn changed(what: &str, revision: u64) -> ApiError {
     let detail = format!("{what} was changed meanwhile; its revision is {revision} now.");
     ApiError::new(StatusCode::PRECONDITION_FAILED, "changed", detail)

@@ -1,9 +1,8 @@
-//! Computes runs in the background, one step at a time: lock, ask what is next, unlock, compute, lock, record. After each
+//! Computes runs in the background, one step at a time: lock, get the next task, unlock, compute, lock, record. After each
 //! step a run goes to the end of the queue.
 //!
-//! A step is recorded only while its computation was not told to end, so a cancelled run gains nothing more.
-//! Recorded steps let go of their images, which the traverse has anyway: only a run's last step keeps the one
-//! from which the next template is cut.
+//! A step is recorded only if its computation was not cancelled, so a cancelled run gains no further steps. Recorded steps
+//! release their images, which the traverse can reload: only a run's last step keeps the image for the next template.
 
 mod driving;
 
@@ -27,36 +26,36 @@ use sightline_track::target::Designation;
 use tokio::sync::broadcast;
 
 use crate::cancel::{CancelFlag, Deadline};
-use crate::driven::OpenTraverses;
+use crate::commanded_drive::OpenTraverses;
 use crate::jobs::{Lane, Position};
 use crate::limits::SharedLimits;
 use crate::live_session::LiveSession;
 use crate::memory;
 use crate::problem::{ApiError, ApiResult};
 use crate::rendering::OpenTraverse;
-use crate::requests_first::Requests;
+use crate::request_priority::Requests;
 use crate::sessions::Sessions;
 use crate::stopwatch::Stopwatch;
 use crate::store::Store;
 
-/// What computes runs: the lane in which they wait, and where their progress is told.
+/// Computes runs: the lane in which they queue, and the state that they change.
 #[derive(Clone)]
 pub(crate) struct Runner {
     lane: Lane,
     events: broadcast::Sender<Event>,
-    /// The open drives, of which one on commands grows.
+    /// The open drives; a commanded one grows.
     traverses: OpenTraverses,
-    /// All sessions, whose steps share the memory for them.
+    /// All sessions, whose steps share a memory limit.
     sessions: Arc<Mutex<Sessions>>,
-    /// Where a session is kept that a drive sends to its next target.
+    /// Stores a session when its drive continues to the next target.
     store: Arc<Store>,
     limits: SharedLimits,
-    /// They are answered before runs go on.
+    /// Requests, which have priority over runs.
     requests: Arc<Requests>,
 }
 
 impl Runner {
-    /// A runner whose runs are computed in `lane`.
+    /// A runner that computes its runs in `lane`.
     pub(crate) fn new(
         lane: Lane,
         events: broadcast::Sender<Event>,
@@ -78,7 +77,7 @@ impl Runner {
     /// Continues a run in the background.
     ///
     /// # Errors
-    /// A problem when too much is waiting already; the run then stays as it is.
+    /// A problem if the queue is full; the run is then unchanged.
     pub(crate) fn start(&self, live: &Arc<LiveSession>, target: usize, run: usize) -> ApiResult<()> {
         let flag = live.begin(target, run);
         let (runner, owned_live, owned_flag) = (self.clone(), Arc::clone(live), Arc::clone(&flag));
@@ -88,24 +87,24 @@ impl Runner {
         match &submitted {
             Err(_) => live.end(target, run, &flag),
             Ok(()) => {
-                if let Some(before) = self.lane.before(&position) {
-                    self.tell(progress(live, target, run, waiting_for(before)));
+                if let Some(before) = self.lane.jobs_ahead(&position) {
+                    self.send_event(progress(live, target, run, waiting_for(before)));
                 }
             }
         }
         submitted
     }
 
-    /// How many runs a run waits for; `None` unless it waits.
+    /// Number of jobs ahead of a run in the queue; `None` unless it waits.
     pub(crate) fn waits_for(&self, live: &LiveSession, target: usize, run: usize) -> Option<usize> {
-        self.lane.before(&live.position(target, run))
+        self.lane.jobs_ahead(&live.position(target, run))
     }
 
-    /// Computes all runs of a session that was read back, in the background; parents come before their forks. `then` follows
-    /// once all have ended.
+    /// Recomputes all runs of a restored session in the background, parents before their forks, and calls `then` once all
+    /// have ended.
     ///
     /// # Errors
-    /// A problem when too much is waiting already.
+    /// A problem if the queue is full.
     pub(crate) fn restore(
         &self,
         live: &Arc<LiveSession>,
@@ -113,21 +112,21 @@ impl Runner {
     ) -> ApiResult<()> {
         live.set_restoring(true);
         let restoring = Restoring { live: Arc::clone(live), then: Some(Box::new(then)) };
-        self.go_on(live, Some(restoring), every_run)
+        self.resume_runs(live, Some(restoring), every_run)
     }
 
-    /// Computes what is missing of a target's runs in the background, parents before their forks; what goes on already
-    /// is left alone.
+    /// Computes the missing steps of a target's runs in the background, parents before their forks; does not affect runs in
+    /// progress.
     ///
     /// # Errors
-    /// A problem when too much is waiting already.
-    pub(crate) fn go_on_with(&self, live: &Arc<LiveSession>, target: usize) -> ApiResult<()> {
-        self.go_on(live, None, move |session| {
+    /// A problem if the queue is full.
+    pub(crate) fn resume_target(&self, live: &Arc<LiveSession>, target: usize) -> ApiResult<()> {
+        self.resume_runs(live, None, move |session| {
             every_run(session).into_iter().filter(|(own, _)| *own == target).collect()
         })
     }
 
-    fn go_on(
+    fn resume_runs(
         &self,
         live: &Arc<LiveSession>,
         mut restoring: Option<Restoring>,
@@ -147,7 +146,7 @@ impl Runner {
             let Some((target, run, flag)) = &current else {
                 if let Some(restored) = restoring.take() {
                     restored.end();
-                    runner.go_on_driving(&live);
+                    runner.resume_driving(&live);
                 }
                 return ControlFlow::Break(());
             };
@@ -158,20 +157,20 @@ impl Runner {
         })
     }
 
-    fn tell(&self, event: Option<Event>) {
+    fn send_event(&self, event: Option<Event>) {
         if let Some(event) = event {
-            // Nobody may be listening.
+            // An error only means that there are no subscribers.
             let _ = self.events.send(event);
         }
     }
 
-    /// Computes the next step of a run; breaks once the run has ended or is told to.
+    /// Computes the next step of a run; breaks when the run has ended or is cancelled.
     fn turn(&self, live: &LiveSession, target: usize, run: usize, flag: &CancelFlag) -> ControlFlow<()> {
         if self.lane.running() >= rayon::current_num_threads() {
-            self.requests.give_way();
+            self.requests.wait_for_requests();
         }
         let deadline = Deadline::begin(self.limits.step_s.time(), flag);
-        let outcome = match catch_unwind(AssertUnwindSafe(|| self.one_step(live, target, run, flag))) {
+        let outcome = match catch_unwind(AssertUnwindSafe(|| self.compute_step(live, target, run, flag))) {
             Ok(Ok(true)) => return ControlFlow::Continue(()),
             Ok(Err(Error::Cancelled)) if deadline.has_passed() => {
                 let limit = &self.limits.step_s;
@@ -190,15 +189,15 @@ impl Runner {
                 "a run stopped: {}",
                 crate::printable::printable(&why)
             );
-            // The target may have been removed meanwhile.
+            // The target may have been removed in the meantime.
             let _ = live.with(|session| session.fail(target, run, why));
         }
-        self.tell(progress(live, target, run, "done".to_owned()));
+        self.send_event(progress(live, target, run, "done".to_owned()));
         ControlFlow::Break(())
     }
 
-    /// Computes and records one step; false when there is nothing more to compute.
-    fn one_step(&self, live: &LiveSession, target: usize, run: usize, flag: &CancelFlag) -> Result<bool> {
+    /// Computes and records one step; false if there is nothing left to compute.
+    fn compute_step(&self, live: &LiveSession, target: usize, run: usize, flag: &CancelFlag) -> Result<bool> {
         if flag.load(Ordering::Relaxed) || live.is_removed() {
             return Err(Error::Cancelled);
         }
@@ -213,7 +212,7 @@ impl Runner {
                 designate(&live.traverse(), designation, &settings, flag)?
             }
             Next::Advance(pending) => self.advance(live, (target, run), &pending, flag)?,
-            // The drive goes on when the session is as it was.
+            // The drive continues after the session is restored.
             Next::Prepare { .. } | Next::Drive { .. } if live.is_restoring() => return Ok(false),
             Next::Prepare { last, before } => return self.prepare(live, (target, run), &last, before, flag),
             Next::Drive { steering, steps } => return self.drive(live, &steering, &steps, flag),
@@ -226,11 +225,11 @@ impl Runner {
             }
         })?;
         live.measure();
-        self.tell(progress(live, target, run, "tracking".to_owned()));
+        self.send_event(progress(live, target, run, "tracking".to_owned()));
         Ok(true)
     }
 
-    /// The step after the last one, from images that are rendered first where they are missing.
+    /// Computes the step after the last one; renders missing images first.
     fn advance(
         &self,
         live: &LiveSession,
@@ -245,8 +244,8 @@ impl Runner {
             && !traverse.is_odometry_alone(step);
         let camera = pending.first.update.target.designation.camera;
         if has_images && !traverse.is_rendered(step, camera) {
-            self.tell(progress(live, target, run, format!("rendering stop {step}")));
-            // Any other failure is met again by the step itself, which records it as the stop's fault.
+            self.send_event(progress(live, target, run, format!("rendering stop {step}")));
+            // The step itself encounters any other failure and records it as a fault of the stop.
             if let Err(Error::Cancelled) = open.make_camera_ready(step, camera, flag) {
                 return Err(Error::Cancelled);
             }
@@ -268,14 +267,14 @@ impl Runner {
     }
 }
 
-/// A session whose runs are being computed again, until this goes away, also by a panic or a queue that is full.
+/// Marks a session as being restored until dropped, even after a panic or if the queue is full.
 struct Restoring {
     live: Arc<LiveSession>,
     then: Option<Box<dyn FnOnce() + Send>>,
 }
 
 impl Restoring {
-    /// All runs have ended.
+    /// Called when all runs have ended.
     fn end(mut self) {
         self.live.set_restoring(false);
         if let Some(then) = self.then.take() {
@@ -290,7 +289,7 @@ impl Drop for Restoring {
     }
 }
 
-/// All runs of a session, those of the target that is looked at first.
+/// All runs of a session, those of the selected target first.
 fn every_run(session: &Session) -> Vec<(usize, usize)> {
     let mut targets: Vec<_> = (0..session.targets.len()).filter(|&t| !session.targets[t].removed).collect();
     targets.sort_by_key(|&target| session.cursor.target != Some(target));
@@ -302,7 +301,7 @@ fn every_run(session: &Session) -> Vec<(usize, usize)> {
     targets.into_iter().flat_map(runs).collect()
 }
 
-/// Designates a target: renders the stop where that is needed, and computes the first step of a run.
+/// Designates a target: renders the stop if necessary, and computes the first step of a run.
 ///
 /// # Errors
 /// As [`track::designate`]; [`Error::Cancelled`] soon after `cancel` is set.
@@ -314,7 +313,7 @@ pub(crate) fn designate(
 ) -> Result<RunStep> {
     let Designation { step, pixel, camera } = designation;
     if step < open.traverse.stop_count()
-        // A missing pair or a pixel outside is refused by the tracker; nothing needs to be rendered for that.
+        // The tracker rejects a missing pair or a pixel outside the image, without a need for the images.
         && let Ok(pair) = pair::of_stop(&open.traverse, step, camera)
         && pixel.is_inside(pair.left.width(), pair.left.height())
     {
@@ -324,10 +323,10 @@ pub(crate) fn designate(
     track::designate_until(&open.traverse, designation, settings, cancel).map(without_pair)
 }
 
-/// A step with the image from which the next template is cut, which a recorded step let go of.
+/// Reloads the image for the next template, which recorded steps release.
 ///
 /// # Errors
-/// When that image cannot be read.
+/// If that image cannot be read.
 pub(crate) fn with_image(open: &OpenTraverse, step: &Arc<RunStep>) -> Result<Arc<RunStep>> {
     let mut step = Arc::clone(step);
     if let Some(stop) = step.update.target.memory.lacks_image_of() {
@@ -338,7 +337,7 @@ pub(crate) fn with_image(open: &OpenTraverse, step: &Arc<RunStep>) -> Result<Arc
     Ok(step)
 }
 
-/// Adds a step to its run, in the place of one that was paused; the one before lets go of its image.
+/// Appends a step to its run, or replaces a paused one; the previous step releases its image.
 fn record(session: &mut Session, target: usize, run: usize, trace: RunStep) -> Result<()> {
     let trace = Arc::new(trace);
     let current = session.run_mut(target, run)?;
@@ -361,7 +360,7 @@ fn without_pair(mut trace: RunStep) -> RunStep {
     trace
 }
 
-/// How far a run has come; none when it is not there any more.
+/// The progress of a run; `None` if it was removed.
 fn progress(live: &LiveSession, target: usize, run: usize, doing: String) -> Option<Event> {
     let (k, n, stopped) = live.with(|session| {
         let record = session.target(target).ok()?;

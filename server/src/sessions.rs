@@ -1,8 +1,7 @@
-//! The sessions of the server by number: how they come back from the database when a drive is opened, and how they are
-//! removed.
+//! The sessions of the server by number: loading them from the database when a drive is opened, and removing them.
 //!
-//! A removed session leaves the database at once. What the person did is kept in memory, without steps, so that the removal
-//! can be taken back until the server ends or [`RESTORABLE`] later ones were removed.
+//! A removed session is deleted from the database at once. Its saved form, without steps, stays in memory, so that it can be
+//! restored until the server ends or [`RESTORABLE`] further sessions are removed.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex};
@@ -20,10 +19,10 @@ use crate::problem::{ApiError, ApiResult};
 use crate::rendering::OpenTraverse;
 use crate::store::{self, Store};
 
-/// How many removed sessions can be restored.
+/// Maximum number of removed sessions that can be restored.
 const RESTORABLE: usize = 16;
 
-/// A removed session: what the person did, from which its runs are computed again.
+/// A removed session in its saved form, from which its runs can be recomputed.
 pub(crate) struct Removed {
     number: u64,
     saved: SavedSession,
@@ -37,41 +36,41 @@ pub(crate) struct Removed {
 pub(crate) struct Sessions {
     /// The sessions by number.
     pub(crate) by_number: BTreeMap<u64, Arc<LiveSession>>,
-    /// The largest number that a session ever had.
+    /// The largest session number so far.
     pub(crate) last_number: u64,
-    /// Sessions that are being begun: they have a number, and are not on disk yet.
+    /// Number of sessions being created: they have a number, but are not on disk yet.
     beginning: usize,
-    /// Those that were removed, the last one at the end.
+    /// Removed sessions, most recent last.
     removed: VecDeque<Removed>,
 }
 
 impl Sessions {
-    /// The sessions on disk whose traverses are open; the others stay where they are. A notice says which of them are not
-    /// shown although a drive of their index is open: their numbers belong to other images.
+    /// Loads the sessions on disk whose traverses are open. A notice lists those that are hidden although a drive with the
+    /// same index is open: their results belong to other images.
     ///
     /// # Errors
     /// A database that cannot be read or written.
-    pub(crate) fn read_back(store: &Store, traverses: &[Arc<OpenTraverse>]) -> Result<(Self, Vec<String>)> {
+    pub(crate) fn load(store: &Store, traverses: &[Arc<OpenTraverse>]) -> Result<(Self, Vec<String>)> {
         let mut found = store.load()?;
         let mut sessions = Self { last_number: found.last_number, ..Self::default() };
         let mut notices = std::mem::take(&mut found.messages);
         let mut hidden = BTreeMap::<String, Vec<String>>::new();
         for saved in std::mem::take(&mut found.sessions) {
             let Some(number) = store::number_of(&saved.id) else { continue };
-            let (traverse, saved) = match place(traverses, saved) {
-                Place::On(traverse, saved) => (traverse, saved),
-                Place::Renamed(traverse, saved) => {
-                    // Otherwise it is renamed at the next start again.
+            let (traverse, saved) = match origin_of(traverses, saved) {
+                SessionOrigin::On(traverse, saved) => (traverse, saved),
+                SessionOrigin::Renamed(traverse, saved) => {
+                    // On failure, the next start renames it.
                     if let Err(error) = store.save(&saved) {
                         notices.push(format!("session {}: {error}", saved.id));
                     }
                     (traverse, saved)
                 }
-                Place::OtherImages(saved) => {
+                SessionOrigin::OtherImages(saved) => {
                     hidden.entry(saved.traverse).or_default().push(saved.id);
                     continue;
                 }
-                Place::Nowhere => continue,
+                SessionOrigin::NotOpen => continue,
             };
             match Session::restored(&saved, traverse.traverse.stop_count()) {
                 Ok(session) => {
@@ -87,10 +86,10 @@ impl Sessions {
         Ok((sessions, notices))
     }
 
-    /// Whether another session may be begun.
+    /// Checks the number of sessions before another one is created.
     ///
     /// # Errors
-    /// A problem when there are too many.
+    /// A problem if there are too many.
     pub(crate) fn has_room(&self, limit: &Limit) -> ApiResult<()> {
         if self.by_number.len() + self.beginning < limit.count() {
             return Ok(());
@@ -100,10 +99,10 @@ impl Sessions {
         Err(ApiError::conflict(detail).hint(limit.hint(way_out)))
     }
 
-    /// A number for a session that is begun.
+    /// Reserves the number of a new session.
     ///
     /// # Errors
-    /// A problem when there are too many.
+    /// A problem if there are too many.
     pub(crate) fn reserve(&mut self, limit: &Limit) -> ApiResult<u64> {
         self.has_room(limit)?;
         self.beginning += 1;
@@ -111,7 +110,7 @@ impl Sessions {
         Ok(self.last_number)
     }
 
-    /// Enters the session for which a number was reserved, or gives the number back.
+    /// Adds the session with a reserved number, or cancels the reservation.
     pub(crate) fn enter(&mut self, number: u64, live: Option<&Arc<LiveSession>>) {
         self.beginning -= 1;
         match live {
@@ -128,7 +127,7 @@ impl Sessions {
         self.by_number.values().filter(|live| live.traverse().id == traverse).count()
     }
 
-    /// Takes a session out that was removed from the database, and keeps what the person did.
+    /// Moves a session that was removed from the database to the removed ones, in its saved form.
     pub(crate) fn take(&mut self, number: u64) {
         let Some(live) = self.by_number.remove(&number) else { return };
         let (saved, notes) = live.with(|session| (session.saved(), live.with_notes(|notes| notes.clone())));
@@ -138,17 +137,17 @@ impl Sessions {
         self.removed.drain(..surplus);
     }
 
-    /// Forgets the removed sessions of a traverse.
+    /// Discards the removed sessions of a traverse.
     pub(crate) fn forget_removed_on(&mut self, traverse: &str) {
         self.removed.retain(|removed| removed.traverse.id != traverse);
     }
 }
 
-/// Brings a removed session back.
+/// Restores a removed session.
 ///
 /// # Errors
-/// A problem when it was not removed, too long ago, there are too many sessions, or it cannot be written: it is then
-/// restorable still.
+/// A problem if it was not removed or too long ago, there are too many sessions, or it cannot be written; in the last two
+/// cases it can still be restored.
 pub(crate) fn restore(
     sessions: &Mutex<Sessions>,
     store: &Store,
@@ -156,46 +155,50 @@ pub(crate) fn restore(
     number: u64,
 ) -> ApiResult<()> {
     let mut sessions = lock(sessions);
-    let place = sessions.removed.iter().position(|removed| removed.number == number).ok_or_else(|| {
+    let index = sessions.removed.iter().position(|removed| removed.number == number).ok_or_else(|| {
         ApiError::not_found("There is no such removed session.")
             .hint(format!("The last {RESTORABLE} removed sessions can be restored until the server ends."))
     })?;
     sessions.has_room(limit)?;
-    let removed = &sessions.removed[place];
+    let removed = &sessions.removed[index];
     let session = Session::restored(&removed.saved, removed.traverse.traverse.stop_count())?;
     let live = LiveSession::new(session, Arc::clone(&removed.traverse), false);
     live.with_notes(|notes| *notes = removed.notes.clone());
     live.set_used(removed.used);
     store.save_with(&removed.saved, Some(&removed.notes))?;
-    sessions.removed.remove(place);
+    sessions.removed.remove(index);
     sessions.by_number.insert(number, Arc::new(live));
     Ok(())
 }
 
-/// Where a saved session belongs.
-enum Place {
+/// The relation of a saved session to the open drives.
+enum SessionOrigin {
     /// On an open drive.
     On(Arc<OpenTraverse>, SavedSession),
-    /// On an open drive, which has another name since the session was saved.
+    /// On an open drive whose name has changed since the session was saved.
     Renamed(Arc<OpenTraverse>, SavedSession),
     /// On a drive of the same index as an open one, but with other images.
     OtherImages(SavedSession),
     /// On a drive that is not open.
-    Nowhere,
+    NotOpen,
 }
 
-fn place(traverses: &[Arc<OpenTraverse>], saved: SavedSession) -> Place {
+fn origin_of(traverses: &[Arc<OpenTraverse>], saved: SavedSession) -> SessionOrigin {
     let find = |wanted: Relation| {
         traverses.iter().find(|open| open.identity.relation(&saved.traverse) == wanted).cloned()
     };
     if let Some(open) = find(Relation::Same) {
-        return Place::On(open, saved);
+        return SessionOrigin::On(open, saved);
     }
     if let Some(open) = find(Relation::SameIndex) {
         let saved = SavedSession { traverse: open.id.clone(), ..saved };
-        return Place::Renamed(open, saved);
+        return SessionOrigin::Renamed(open, saved);
     }
-    if find(Relation::OtherFiles).is_some() { Place::OtherImages(saved) } else { Place::Nowhere }
+    if find(Relation::OtherFiles).is_some() {
+        SessionOrigin::OtherImages(saved)
+    } else {
+        SessionOrigin::NotOpen
+    }
 }
 
 fn images_changed(drive: &str, sessions: &[String]) -> String {

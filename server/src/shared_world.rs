@@ -1,5 +1,5 @@
-//! The world of a drive for one who takes long: it is held for each change alone, and read in a snapshot, so that others may
-//! look at it while images are rendered and vision measures a motion.
+//! Access to the world of a drive during long operations: locked only for each change, and read from a snapshot, so that it
+//! is available while images are rendered and visual odometry runs.
 
 use std::sync::{Arc, Mutex};
 
@@ -16,7 +16,7 @@ use sightline_track::target::Designation;
 
 use crate::jobs::lock;
 
-/// A world that others look at meanwhile.
+/// A world that is shared during a long operation.
 pub(crate) struct SharedWorld<'a> {
     world: &'a Mutex<DrivenTraverse>,
     cache: &'a Arc<Cache>,
@@ -24,7 +24,7 @@ pub(crate) struct SharedWorld<'a> {
 }
 
 impl<'a> SharedWorld<'a> {
-    /// The world as it is now, with the images of the last stop also where they are put off.
+    /// A snapshot of the world, including pending images of the last stop.
     ///
     /// # Errors
     /// An index that cannot be read.

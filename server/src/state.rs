@@ -1,4 +1,4 @@
-//! What the handlers share: the open traverses, the sessions, and the ways to compute, to save and to tell.
+//! The state shared by the handlers: open traverses, sessions, and the means to compute, store and notify.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -12,8 +12,8 @@ use sightline_track::locate::store::Cache;
 use tokio::sync::broadcast;
 
 use crate::access::Access;
+use crate::commanded_drive::{self, OpenTraverses};
 use crate::connections::Connections;
-use crate::driven::{self, OpenTraverses};
 use crate::drives;
 use crate::folders::Folders;
 use crate::idempotency;
@@ -24,17 +24,17 @@ use crate::live_session::LiveSession;
 use crate::odometry_tables::OdometryTables;
 use crate::problem::{ApiError, ApiResult};
 use crate::questions::Questions;
-use crate::rendering::{Ahead, OpenTraverse};
-use crate::requests_first::Requests;
+use crate::rendering::{OpenTraverse, Prefetcher};
+use crate::request_priority::Requests;
 use crate::routes::counterfactual;
 use crate::runner::Runner;
 use crate::sessions::Sessions;
 use crate::store::{self, Store};
 use crate::streams::Streams;
-use crate::study::jobs::Shelf;
+use crate::study::jobs::StudyQueue;
 use crate::study::order::order;
-use crate::study::saved::Keeper;
-use crate::trackability_maps::Maps;
+use crate::study::saved::StudyStore;
+use crate::trackability_maps::MapCache;
 use crate::uploads::Uploads;
 
 mod bounds;
@@ -44,37 +44,37 @@ mod removal;
 
 use self::lanes::Lanes;
 
-/// Events that a slow page may be behind before it is told to read everything again.
+/// Number of events that a slow page may lag behind before it must read everything again.
 const EVENT_BACKLOG: usize = 256;
 
-/// What the handlers share.
+/// The state shared by the handlers.
 #[derive(Clone)]
 pub struct AppState(Arc<Inner>);
 
 struct Inner {
     access: Access,
     traverses: OpenTraverses,
-    /// The names of the traverses that the server was given, which cannot be removed.
+    /// The names of the traverses given at the server's start, which cannot be removed.
     given: BTreeSet<String>,
-    /// Held while a drive is made or removed, because both change its folder.
-    making_drives: Mutex<()>,
+    /// Locked while a drive is created or removed, because both change its folder.
+    drive_folder_lock: Mutex<()>,
     folders: Folders,
     sessions: Arc<Mutex<Sessions>>,
     limits: SharedLimits,
-    /// Images and other results of all drives.
+    /// Cache of images and other results of all drives.
     cache: Arc<Cache>,
     connections: Arc<Connections>,
     repeated: Arc<idempotency::Answers>,
     requests: Arc<Requests>,
     events: broadcast::Sender<Event>,
     runner: Runner,
-    ahead: Arc<Ahead>,
+    prefetcher: Arc<Prefetcher>,
     store: Arc<Store>,
     notices: Vec<String>,
     lanes: Lanes,
-    studies: Shelf,
+    studies: StudyQueue,
     streams: Streams,
-    maps: Maps,
+    maps: MapCache,
     odometry: OdometryTables,
     questions: Questions,
     imports: Imports,
@@ -83,13 +83,13 @@ struct Inner {
 
 impl Drop for Inner {
     fn drop(&mut self) {
-        self.ahead.close();
+        self.prefetcher.close();
         self.studies.close();
     }
 }
 
 impl AppState {
-    /// Opens the state: sessions are kept in `folder` and read back from it, studies in a folder inside.
+    /// Creates the state: sessions are loaded from `folder` and stored there, studies in a subfolder.
     ///
     /// # Errors
     /// As `Self::with_folders`.
@@ -110,7 +110,7 @@ impl AppState {
         Self::with_folders(traverses, &Folders::in_one(folder), access, limits)
     }
 
-    /// The same, whose pages may open the recordings below these folders.
+    /// The same, with folders whose recordings pages may open.
     ///
     /// # Errors
     /// As `Self::with_folders`, or a folder that does not exist.
@@ -125,10 +125,10 @@ impl AppState {
         Self::with_folders(traverses, &folders, access, limits)
     }
 
-    /// Opens the state on its folders.
+    /// Creates the state with its folders.
     ///
     /// # Errors
-    /// A folder that cannot be read or made, a drive beyond the limits, or a system without threads.
+    /// A folder that cannot be read or created, a drive beyond the limits, or a system that cannot start threads.
     pub(crate) fn with_folders(
         traverses: Vec<Traverse>,
         folders: &Folders,
@@ -141,31 +141,31 @@ impl AppState {
         traverses.iter().try_for_each(|traverse| limits.check_drive(traverse))?;
         let (cache, limits) = (Arc::new(Cache::new(limits.cache_bytes.count())), Arc::new(limits));
         let traverses = traverses.into_iter().map(|traverse| traverse.with_cache(&cache)).collect();
-        let (mut open, of_drives) = drives::open_given(traverses, folders, &events)?;
+        let (mut open, of_drives) = drives::open_initial(traverses, folders, &events)?;
         let given = open.iter().map(|open| open.id.clone()).collect();
         let store = Store::open(&folders.sessions)?;
-        let lost = open_again(&store, folders, &cache, &mut open, &events)?;
-        let (sessions, mut notices) = Sessions::read_back(&store, &open)?;
+        let lost = reopen(&store, folders, &cache, &mut open, &events)?;
+        let (sessions, mut notices) = Sessions::load(&store, &open)?;
         notices.extend(of_drives.into_iter().chain(lost));
         for notice in &notices {
             tracing::warn!("{}", crate::printable::printable(notice));
         }
-        let ahead = Ahead::start().map_err(no_threads)?;
+        let prefetcher = Prefetcher::start().map_err(no_threads)?;
         if let Some(first) = open.first() {
-            ahead.look_at(first, 0);
+            prefetcher.prefetch_from(first, 0);
         }
-        let questions = Questions::read_back(&store, &limits)?;
+        let questions = Questions::load(&store, &limits)?;
         let store = Arc::new(store);
-        let keeper = Keeper::new(&store);
-        let studies = Shelf::new(folders.studies.clone(), events.clone(), keeper, &limits);
+        let study_store = StudyStore::new(&store);
+        let studies = StudyQueue::new(folders.studies.clone(), events.clone(), study_store, &limits);
         let (traverses, sessions) = (Arc::new(Mutex::new(open)), Arc::new(Mutex::new(sessions)));
         let runs = lanes::lane(&limits.runs_at_a_time, &limits.runs_waiting);
         let requests = Arc::<Requests>::default();
-        studies.read_back(|new| order(&folders.studies, new))?;
+        studies.load(|new| order(&folders.studies, new))?;
         Ok(Self(Arc::new(Inner {
             access,
             given,
-            making_drives: Mutex::default(),
+            drive_folder_lock: Mutex::default(),
             folders: folders.clone(),
             runner: Runner::new(runs, events.clone(), (&traverses, &sessions), &store, &limits, &requests),
             traverses,
@@ -175,13 +175,13 @@ impl AppState {
             repeated: Arc::new(idempotency::Answers::new(&limits)),
             requests,
             events,
-            ahead,
+            prefetcher,
             store,
             notices,
             lanes: Lanes::new(&limits),
             studies,
             streams: Streams::default(),
-            maps: Maps::new(&limits),
+            maps: MapCache::new(&limits),
             odometry: OdometryTables::new(&limits),
             questions,
             imports: Imports::new(&limits),
@@ -190,32 +190,32 @@ impl AppState {
         })))
     }
 
-    /// The requests that are being answered.
+    /// The requests in progress.
     pub(crate) fn requests(&self) -> &Arc<Requests> {
         &self.0.requests
     }
 
-    /// Who may use the server, and under which names.
+    /// The access rules: token and host names.
     pub(crate) fn access(&self) -> &Access {
         &self.0.access
     }
 
-    /// What a person should know about this start of the server, and about what fails now, one sentence each.
+    /// Notices about this start of the server and about current failures, one sentence each.
     pub(crate) fn notices(&self) -> Vec<String> {
         self.0.store.trouble().into_iter().chain(self.0.notices.iter().cloned()).collect()
     }
 
-    /// The open traverses, those that were opened from a page last.
+    /// The open traverses; those opened from a page are last.
     pub fn traverses(&self) -> Vec<Arc<OpenTraverse>> {
         lock(&self.0.traverses).clone()
     }
 
-    /// Where the server keeps what it makes.
+    /// The folders with the server's data.
     pub(crate) fn folders(&self) -> &Folders {
         &self.0.folders
     }
 
-    /// Adds a traverse with the sessions that it had when it was open before; the one of that name where it is open already.
+    /// Adds a traverse with its stored sessions; returns the existing one if a traverse of that name is open.
     ///
     /// # Errors
     /// A database that cannot be read.
@@ -224,7 +224,7 @@ impl AppState {
         if let Some(known) = traverses.iter().find(|known| known.id == open.id) {
             return Ok(Arc::clone(known));
         }
-        let (found, notices) = Sessions::read_back(&self.0.store, std::slice::from_ref(&open))?;
+        let (found, notices) = Sessions::load(&self.0.store, std::slice::from_ref(&open))?;
         for notice in &notices {
             tracing::warn!("{}", crate::printable::printable(notice));
         }
@@ -236,59 +236,59 @@ impl AppState {
         Ok(open)
     }
 
-    /// The traverse of that name.
+    /// The open traverse named `id`.
     ///
     /// # Errors
-    /// A problem when there is none.
+    /// A problem if it does not exist.
     pub fn traverse(&self, id: &str) -> ApiResult<Arc<OpenTraverse>> {
         let found = lock(&self.0.traverses).iter().find(|open| open.id == id).cloned();
         found.ok_or_else(|| ApiError::not_found("There is no such traverse."))
     }
 
-    /// The sessions, in the order in which they were begun.
+    /// The sessions, oldest first.
     pub(crate) fn sessions(&self) -> Vec<Arc<LiveSession>> {
         lock(&self.0.sessions).by_number.values().cloned().collect()
     }
 
-    /// The session of that name; one that sleeps is woken, and its runs computed again.
+    /// The session named `id`; wakes a sleeping one, whose runs are then recomputed.
     ///
     /// # Errors
-    /// A problem when there is none.
+    /// A problem if it does not exist.
     pub fn session(&self, id: &str) -> ApiResult<Arc<LiveSession>> {
         let number = store::number_of(id);
         let found = number.and_then(|number| lock(&self.0.sessions).by_number.get(&number).cloned());
         let live = found.ok_or_else(|| ApiError::not_found("There is no such session."))?;
-        live.memory.is_asked_for();
+        live.memory.mark_requested();
         if live.wake() {
             let (state, restored) = (self.clone(), Arc::clone(&live));
-            let go_on = move || counterfactual::go_on(&state, &restored);
-            self.0.runner.restore(&live, go_on).inspect_err(|_| live.sleep())?;
+            let resume_questions = move || counterfactual::resume_questions(&state, &restored);
+            self.0.runner.restore(&live, resume_questions).inspect_err(|_| live.sleep())?;
         }
         Ok(live)
     }
 
-    /// What survives the server.
+    /// The persistent store.
     pub fn store(&self) -> &Store {
         &self.0.store
     }
 
-    /// Renders the stops of `traverse` from `from` on before all others.
-    pub(crate) fn look_at(&self, traverse: &Arc<OpenTraverse>, from: usize) {
-        self.0.ahead.look_at(traverse, from);
+    /// Renders the stops of `traverse` from `from` onwards before all others.
+    pub(crate) fn prefetch_from(&self, traverse: &Arc<OpenTraverse>, from: usize) {
+        self.0.prefetcher.prefetch_from(traverse, from);
     }
 
-    /// Tells every page.
-    pub(crate) fn tell(&self, event: Event) {
-        // Nobody may be listening.
+    /// Sends an event to every page.
+    pub(crate) fn send_event(&self, event: Event) {
+        // An error only means that there are no subscribers.
         let _ = self.0.events.send(event);
     }
 
-    /// Where events are told.
+    /// The channel of events.
     pub fn events(&self) -> &broadcast::Sender<Event> {
         &self.0.events
     }
 
-    /// What a page must hear that may have missed anything.
+    /// The events for a page that may have missed any change.
     pub(crate) fn everything_may_have_changed(&self) -> Vec<Event> {
         let sessions =
             self.sessions().into_iter().map(|live| Event::SessionChanged { session: live.id.clone() });
@@ -296,7 +296,7 @@ impl AppState {
         sessions.chain(traverses.map(|open| open.progress(None))).collect()
     }
 
-    /// The session as pages and scripts see it, with what its runs wait for.
+    /// The session as sent to pages and scripts, with the queue positions of its runs.
     pub(crate) fn view(&self, live: &LiveSession) -> SessionView {
         let mut view = live.with(|session| session.view());
         for target in &mut view.targets {
@@ -307,27 +307,27 @@ impl AppState {
         view
     }
 
-    /// What computes runs.
+    /// The runner, which computes runs.
     pub(crate) fn runner(&self) -> &Runner {
         &self.0.runner
     }
 
-    /// Where runs are computed.
+    /// The lane of runs.
     pub(crate) fn jobs(&self) -> &Lane {
         self.0.runner.lane()
     }
 
-    /// The studies that were started.
-    pub(crate) fn studies(&self) -> &Shelf {
+    /// The studies started so far.
+    pub(crate) fn studies(&self) -> &StudyQueue {
         &self.0.studies
     }
 
-    /// The trackability of stops.
-    pub(crate) fn maps(&self) -> &Maps {
+    /// The trackability maps of stops.
+    pub(crate) fn maps(&self) -> &MapCache {
         &self.0.maps
     }
 
-    /// The odometry of stops with its corners.
+    /// The odometry tables of stops, with their corners.
     pub(crate) fn odometry(&self) -> &OdometryTables {
         &self.0.odometry
     }
@@ -337,7 +337,7 @@ impl AppState {
         &self.0.imports
     }
 
-    /// The recordings that pages send.
+    /// The uploads of recordings.
     pub(crate) fn uploads(&self) -> &Uploads {
         &self.0.uploads
     }
@@ -347,25 +347,25 @@ impl AppState {
         &self.0.streams
     }
 
-    /// What would have saved steps: the questions that were asked.
+    /// The counterfactual questions.
     pub(crate) fn questions(&self) -> &Questions {
         &self.0.questions
     }
 }
 
-/// Opens the drives of earlier starts; what cannot be opened is said in one sentence each.
+/// Reopens the drives of earlier starts; returns one sentence for each that cannot be opened.
 ///
 /// # Errors
-/// As [`drives::open_again`].
-fn open_again(
+/// As [`drives::reopen`].
+fn reopen(
     store: &Store,
     folders: &Folders,
     cache: &Arc<Cache>,
     open: &mut Vec<Arc<OpenTraverse>>,
     events: &broadcast::Sender<Event>,
 ) -> Result<Vec<String>> {
-    let mut lost = drives::open_again(store, folders, cache, open, events)?;
-    lost.extend(driven::open_again(folders, cache, open, events));
-    lost.extend(imports::open_again(folders, cache, open, events));
+    let mut lost = drives::reopen(store, folders, cache, open, events)?;
+    lost.extend(commanded_drive::reopen(folders, cache, open, events));
+    lost.extend(imports::reopen(folders, cache, open, events));
     Ok(lost)
 }

@@ -1,4 +1,4 @@
-//! The memory of the steps of one session, and when somebody asked for it last.
+//! Memory of the steps of one session, and the time of its last request.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -6,36 +6,36 @@ use std::time::Instant;
 
 use crate::jobs::lock;
 
-/// The memory of the steps of one session.
+/// Memory of the steps of one session, with the time of its last request.
 #[derive(Debug)]
 pub(crate) struct StepMemory {
     bytes: AtomicUsize,
-    asked: Mutex<Instant>,
+    last_request: Mutex<Instant>,
 }
 
 impl Default for StepMemory {
     fn default() -> Self {
-        Self { bytes: AtomicUsize::new(0), asked: Mutex::new(Instant::now()) }
+        Self { bytes: AtomicUsize::new(0), last_request: Mutex::new(Instant::now()) }
     }
 }
 
 impl StepMemory {
-    /// Remembers that somebody asks for the session now.
-    pub(crate) fn is_asked_for(&self) {
-        *lock(&self.asked) = Instant::now();
+    /// Records a request for the session.
+    pub(crate) fn mark_requested(&self) {
+        *lock(&self.last_request) = Instant::now();
     }
 
-    /// When somebody asked for the session last.
-    pub(crate) fn asked(&self) -> Instant {
-        *lock(&self.asked)
+    /// Time of the last request for the session.
+    pub(crate) fn last_request(&self) -> Instant {
+        *lock(&self.last_request)
     }
 
-    /// The memory as it was measured last, bytes.
+    /// The last measured memory, bytes.
     pub(crate) fn bytes(&self) -> usize {
         self.bytes.load(Ordering::Relaxed)
     }
 
-    /// Remembers the memory.
+    /// Sets the measured memory, bytes.
     pub(crate) fn set(&self, bytes: usize) {
         self.bytes.store(bytes, Ordering::Relaxed);
     }

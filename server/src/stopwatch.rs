@@ -1,4 +1,4 @@
-//! Measures the stages of a step while it is computed; the core has no clock.
+//! Measures the duration of a step's stages; the core has no clock.
 
 use std::cell::RefCell;
 use std::time::Instant;
@@ -6,7 +6,7 @@ use std::time::Instant;
 use sightline_session::times::Took;
 use sightline_track::cycle_stage::CycleStage;
 
-/// Measures the stages of a step, each from the end of the one before.
+/// Measures the stages of a step, each from the end of the previous one.
 pub(crate) struct Stopwatch {
     last: RefCell<Instant>,
     took: RefCell<Took>,
@@ -17,14 +17,14 @@ impl Stopwatch {
         Self { last: RefCell::new(Instant::now()), took: RefCell::default() }
     }
 
-    /// Takes the end of a stage.
+    /// Records the end of a stage.
     pub(crate) fn ended(&self, stage: CycleStage) {
         let now = Instant::now();
         let before = self.last.replace(now);
         self.took.borrow_mut().0.push((stage, (now - before).as_secs_f64()));
     }
 
-    /// The times so far.
+    /// The durations so far.
     pub(crate) fn took(self) -> Took {
         self.took.into_inner()
     }

@@ -1,7 +1,7 @@
-//! Which sessions are streamed to Rerun: off until a person asks for it, and closed again on request.
+//! Tracks which sessions are streamed to Rerun: none until requested, and closed again on request.
 //!
-//! A stream is only the permission to read the session as a live recording; the recording itself is made for each viewer
-//! while it reads, so that a stream without viewers takes no memory.
+//! A stream is only the permission to read the session as a live recording. The recording is created for each viewer while
+//! it reads, so a stream without viewers uses no memory.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
@@ -12,10 +12,10 @@ use tokio_util::sync::CancellationToken;
 use crate::jobs::lock;
 use crate::problem::{ApiError, ApiResult};
 
-/// Sessions that may be streamed at a time: more viewers than a person can look at.
+/// Maximum number of streamed sessions.
 const STREAM_LIMIT: usize = 4;
 
-/// Viewers of all streams at a time; each has the threads and the batch of a recording of its own.
+/// Maximum number of viewers of all streams; each has its own recording threads and batch.
 const VIEWER_LIMIT: usize = 8;
 
 /// The open streams, by session.
@@ -31,10 +31,10 @@ impl Default for Streams {
 }
 
 impl Streams {
-    /// Opens the stream of a session, which may be open already.
+    /// Opens the stream of a session, if it is not open.
     ///
     /// # Errors
-    /// A problem when too many are open.
+    /// A problem if too many are open.
     pub(crate) fn open(&self, session: &str) -> ApiResult<()> {
         let mut open = lock(&self.open);
         if open.contains_key(session) {
@@ -50,32 +50,32 @@ impl Streams {
         Ok(())
     }
 
-    /// Closes the stream of a session, also for the viewers that read it; says whether it was open.
+    /// Closes the stream of a session and disconnects its viewers; returns whether it was open.
     pub(crate) fn close(&self, session: &str) -> bool {
         lock(&self.open).remove(session).inspect(CancellationToken::cancel).is_some()
     }
 
-    /// Lets a viewer read the stream of a session.
+    /// Registers a viewer of a session's stream.
     ///
     /// # Errors
-    /// A problem when it is not open, or too many viewers read.
+    /// A problem if the stream is not open, or there are too many viewers.
     pub(crate) fn view(&self, session: &str) -> ApiResult<Viewing> {
         let closed = lock(&self.open).get(session).cloned();
         let closed = closed.ok_or_else(|| {
             let hint = format!("Open it: `POST sessions/{session}/rerun`.");
             ApiError::not_found("This session is not streamed to Rerun.").hint(hint)
         })?;
-        let place = Arc::clone(&self.viewers).try_acquire_owned();
-        let place = place.map_err(|_| ApiError::busy().hint("Close a Rerun viewer."))?;
-        Ok(Viewing { closed, _place: place })
+        let permit = Arc::clone(&self.viewers).try_acquire_owned();
+        let permit = permit.map_err(|_| ApiError::busy().hint("Close a Rerun viewer."))?;
+        Ok(Viewing { closed, _permit: permit })
     }
 }
 
-/// A viewer's place, given back when it is dropped.
+/// The registration of a viewer, released on drop.
 pub(crate) struct Viewing {
     /// Cancelled when the stream is closed.
     pub closed: CancellationToken,
-    _place: OwnedSemaphorePermit,
+    _permit: OwnedSemaphorePermit,
 }
 
 #[cfg(test)]

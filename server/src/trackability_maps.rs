@@ -1,4 +1,4 @@
-//! The trackability maps that were made or are being made, and the surfaces behind the newest.
+//! Cache of trackability maps, finished or in progress, and of the surfaces for the newest ones.
 
 use std::collections::VecDeque;
 use std::sync::atomic::Ordering;
@@ -14,16 +14,16 @@ use crate::jobs::{Lane, lock};
 use crate::limits::SharedLimits;
 use crate::rendering::OpenTraverse;
 
-/// The maps that were made or are being made, and the surfaces behind the newest.
-pub(crate) struct Maps {
-    making: Mutex<VecDeque<Arc<Making>>>,
+/// Cache of trackability maps, finished or in progress, and of the surfaces for the newest ones.
+pub(crate) struct MapCache {
+    jobs: Mutex<VecDeque<Arc<MapJob>>>,
     grounds: Mutex<VecDeque<(String, Arc<Ground>)>>,
     pub(crate) turn: Lane,
     limits: SharedLimits,
 }
 
-/// A map that is made, or was.
-pub(crate) struct Making {
+/// A map, finished or in progress.
+pub(crate) struct MapJob {
     traverse: String,
     pub(crate) step: usize,
     pub(crate) limits: TrackabilityLimits,
@@ -31,11 +31,11 @@ pub(crate) struct Making {
     pub(crate) cancel: CancelFlag,
 }
 
-impl Maps {
-    /// No maps yet.
+impl MapCache {
+    /// An empty cache.
     pub(crate) fn new(limits: &SharedLimits) -> Self {
         let turn = Lane::new(1, limits.maps_waiting.count());
-        Self { making: Mutex::default(), grounds: Mutex::default(), turn, limits: Arc::clone(limits) }
+        Self { jobs: Mutex::default(), grounds: Mutex::default(), turn, limits: Arc::clone(limits) }
     }
 
     pub(crate) fn find_or_begin(
@@ -43,40 +43,40 @@ impl Maps {
         traverse: &str,
         step: usize,
         limits: TrackabilityLimits,
-    ) -> (Arc<Making>, bool) {
-        let mut making = lock(&self.making);
-        if let Some(known) = making.iter().find(|one| one.is_of(traverse, step, &limits)) {
+    ) -> (Arc<MapJob>, bool) {
+        let mut jobs = lock(&self.jobs);
+        if let Some(known) = jobs.iter().find(|one| one.is_of(traverse, step, &limits)) {
             return (Arc::clone(known), false);
         }
         let progress = MapProgress { k: 0, n: 0, ended: false, failed: None, map: None };
         let (traverse, cancel) = (traverse.to_owned(), CancelFlag::default());
-        let new = Arc::new(Making { traverse, step, limits, progress: Mutex::new(progress), cancel });
-        making.push_back(Arc::clone(&new));
-        // The oldest that is complete goes; those under way are few.
-        if making.len() > self.limits.maps.count()
-            && let Some(place) = making.iter().position(|one| lock(&one.progress).ended)
+        let new = Arc::new(MapJob { traverse, step, limits, progress: Mutex::new(progress), cancel });
+        jobs.push_back(Arc::clone(&new));
+        // Removes the oldest complete map; those in progress are few.
+        if jobs.len() > self.limits.maps.count()
+            && let Some(index) = jobs.iter().position(|one| lock(&one.progress).ended)
         {
-            making.remove(place);
+            jobs.remove(index);
         }
         (new, true)
     }
 
-    /// A map that is under way, taken out, so that the next who asks begins anew.
+    /// Removes and returns a map in progress, so that the next request starts a new one.
     pub(crate) fn take_unfinished(
         &self,
         traverse: &str,
         step: usize,
         limits: &TrackabilityLimits,
-    ) -> Option<Arc<Making>> {
-        let mut making = lock(&self.making);
-        let place =
-            making.iter().position(|one| one.is_of(traverse, step, limits) && !lock(&one.progress).ended)?;
-        making.remove(place)
+    ) -> Option<Arc<MapJob>> {
+        let mut jobs = lock(&self.jobs);
+        let index =
+            jobs.iter().position(|one| one.is_of(traverse, step, limits) && !lock(&one.progress).ended)?;
+        jobs.remove(index)
     }
 
-    /// Forgets everything about a traverse; what is being made ends.
+    /// Removes the maps of a traverse; those in progress are cancelled.
     pub(crate) fn forget(&self, traverse: &str) {
-        lock(&self.making).retain(|one| {
+        lock(&self.jobs).retain(|one| {
             let is_kept = one.traverse != traverse;
             if !is_kept {
                 one.cancel.store(true, Ordering::Relaxed);
@@ -86,7 +86,7 @@ impl Maps {
         lock(&self.grounds).retain(|(id, _)| id != traverse);
     }
 
-    /// What lies under the pixels of a stop, kept for the newest.
+    /// The surface under the pixels of a stop, cached for the newest ones.
     pub(crate) fn ground(
         &self,
         open: &OpenTraverse,
@@ -112,12 +112,12 @@ impl Maps {
     }
 }
 
-impl Making {
+impl MapJob {
     pub(crate) fn is_of(&self, traverse: &str, step: usize, limits: &TrackabilityLimits) -> bool {
         self.traverse == traverse && self.step == step && self.limits == *limits
     }
 
-    /// Nothing more will come; the first reason stands.
+    /// Marks the map as ended; the first reason is kept.
     pub(crate) fn end(&self, why: Option<String>) {
         let mut progress = lock(&self.progress);
         if !progress.ended {

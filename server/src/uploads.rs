@@ -1,7 +1,7 @@
-//! Recordings that a page sends: file by file, or as one zip archive, into a folder of their own until they are imported.
+//! Recordings uploaded by a page: file by file, or as one zip archive, into a separate folder until they are imported.
 //!
 //! Names are confined to that folder: relative, without `..`, and an archive may contain no links. Bytes are counted while
-//! they arrive and while they are unpacked, whatever their headers say. Nothing survives a restart.
+//! they are received and unpacked, independent of the headers. Uploads do not survive a restart.
 
 use std::fs::File;
 use std::io::{Read, Write};
@@ -16,28 +16,29 @@ use zip::ZipArchive;
 use zip::read::ZipFile;
 use zip::result::ZipError;
 
-use crate::brought::remove_folder;
 use crate::folders::{Folders, make_private};
+use crate::import_session::remove_folder;
 use crate::jobs::{blocking, lock};
 use crate::limits::{Limits, SharedLimits};
 use crate::printable::printable;
 use crate::problem::{ApiError, ApiResult};
 
-/// The name of an archive in the folder of its upload, which no sent file can have: it is no path of a recording.
+/// The name of an archive in the folder of its upload; uploaded files cannot have it, because it is not a valid path in a
+/// recording.
 const ARCHIVE: &str = ".archive.zip";
-/// Bytes that are unpacked at a time.
+/// Bytes per read while unpacking.
 const CHUNK: usize = 1 << 16;
-/// Characters of a name in a sentence.
+/// Maximum length of a file name in a message, characters.
 const NAME_SHOWN: usize = 120;
 
 /// The uploads of a server.
 pub(crate) struct Uploads {
-    all: Mutex<Inside>,
+    list: Mutex<UploadList>,
     limits: SharedLimits,
 }
 
 #[derive(Default)]
-struct Inside {
+struct UploadList {
     uploads: Vec<Arc<Upload>>,
     number: u64,
 }
@@ -46,110 +47,113 @@ struct Inside {
 pub(crate) struct Upload {
     id: String,
     folder: PathBuf,
-    used: Mutex<Used>,
+    size: Mutex<UploadSize>,
     limits: SharedLimits,
 }
 
-/// What an upload has taken.
+/// The size of an upload so far.
 #[derive(Clone, Copy, Default)]
-struct Used {
+struct UploadSize {
     files: usize,
     bytes: u64,
 }
 
 impl Uploads {
-    /// No uploads.
+    /// An empty list.
     pub(crate) fn new(limits: &SharedLimits) -> Self {
-        Self { all: Mutex::default(), limits: Arc::clone(limits) }
+        Self { list: Mutex::default(), limits: Arc::clone(limits) }
     }
 
-    /// Begins an upload.
+    /// Starts an upload.
     ///
     /// # Errors
-    /// A problem when there are too many, or its folder cannot be made.
+    /// A problem if there are too many, or its folder cannot be created.
     pub(crate) fn begin(&self, folders: &Folders) -> ApiResult<UploadView> {
-        let mut all = lock(&self.all);
-        if all.uploads.len() >= self.limits.uploads.count() {
+        let mut list = lock(&self.list);
+        if list.uploads.len() >= self.limits.uploads.count() {
             let way_out = "Import one of them, or remove one: DELETE uploads/{upload}.";
-            let detail = format!("There are {} uploads already.", all.uploads.len());
+            let detail = format!("There are {} uploads already.", list.uploads.len());
             return Err(ApiError::conflict(detail).hint(self.limits.uploads.hint(way_out)));
         }
-        all.number += 1;
-        let id = format!("upload-{}", all.number);
+        list.number += 1;
+        let id = format!("upload-{}", list.number);
         let folder = folders.uploads.join(&id);
         make_private(&folder).map_err(|source| Error::Write { path: folder.clone(), source })?;
         let folder = folder.canonicalize().map_err(|source| Error::Write { path: folder, source })?;
-        let upload = Upload { id, folder, used: Mutex::default(), limits: Arc::clone(&self.limits) };
+        let upload = Upload { id, folder, size: Mutex::default(), limits: Arc::clone(&self.limits) };
         let view = upload.view();
-        all.uploads.push(Arc::new(upload));
+        list.uploads.push(Arc::new(upload));
         Ok(view)
     }
 
-    /// The upload of that name.
+    /// The upload named `id`.
     ///
     /// # Errors
-    /// A problem when there is none.
+    /// A problem if it does not exist.
     pub(crate) fn upload(&self, id: &str) -> ApiResult<Arc<Upload>> {
-        let found = lock(&self.all).uploads.iter().find(|upload| upload.id == id).cloned();
+        let found = lock(&self.list).uploads.iter().find(|upload| upload.id == id).cloned();
         found.ok_or_else(|| ApiError::not_found("There is no such upload."))
     }
 
     /// Removes an upload with its files.
     ///
     /// # Errors
-    /// A problem when there is none, or its folder cannot be removed.
+    /// A problem if it does not exist, or its folder cannot be removed.
     pub(crate) fn remove(&self, id: &str) -> ApiResult<()> {
         let upload = self.upload(id)?;
-        lock(&self.all).uploads.retain(|other| other.id != id);
+        lock(&self.list).uploads.retain(|other| other.id != id);
         Ok(remove_folder(&upload.folder)?)
     }
 
-    /// The folder of the upload that a path is in.
+    /// The folder of the upload that contains `path`.
     pub(crate) fn root_of(&self, path: &Path) -> Option<PathBuf> {
-        let all = lock(&self.all);
-        all.uploads.iter().find(|upload| path.starts_with(&upload.folder)).map(|upload| upload.folder.clone())
+        let list = lock(&self.list);
+        list.uploads
+            .iter()
+            .find(|upload| path.starts_with(&upload.folder))
+            .map(|upload| upload.folder.clone())
     }
 
-    /// Removes the upload in this folder, which was imported.
+    /// Removes the upload in this folder after its import.
     pub(crate) fn imported(&self, root: &Path) {
-        lock(&self.all).uploads.retain(|upload| upload.folder != root);
-        // What stays is removed at the next start.
+        lock(&self.list).uploads.retain(|upload| upload.folder != root);
+        // Remaining files are removed at the next start.
         let _ = remove_folder(root);
     }
 }
 
 impl Upload {
-    /// The upload as pages see it.
+    /// The view of the upload for pages.
     pub(crate) fn view(&self) -> UploadView {
-        let Used { files, bytes } = *lock(&self.used);
+        let UploadSize { files, bytes } = *lock(&self.size);
         UploadView { id: self.id.clone(), path: self.folder.display().to_string(), files, bytes }
     }
 
-    /// Keeps a file under its path in the recording.
+    /// Stores a file at its path in the recording.
     ///
     /// # Errors
-    /// A name that is not allowed or used already, or too many files or bytes.
-    pub(crate) async fn keep(&self, name: &str, body: Body) -> ApiResult<UploadView> {
-        let path = self.place(name, "path")?;
+    /// A name that is invalid or in use, or too many files or bytes.
+    pub(crate) async fn store_file(&self, name: &str, body: Body) -> ApiResult<UploadView> {
+        let path = self.destination(name, "path")?;
         self.take_file()?;
         self.write(&path, name, body).await?;
         Ok(self.view())
     }
 
-    /// Unpacks an archive, which must be all that is sent.
+    /// Unpacks an archive into an empty upload.
     ///
     /// # Errors
-    /// A damaged archive, an entry that is not allowed, or too many files or bytes.
+    /// A damaged archive, an invalid entry, or too many files or bytes.
     pub(crate) async fn unpack(self: Arc<Self>, body: Body) -> ApiResult<UploadView> {
         let path = self.folder.join(ARCHIVE);
         self.write(&path, "the archive", body).await?;
-        // The limit holds for the archive and for what is in it, each by itself.
-        lock(&self.used).bytes = 0;
+        // The limit applies separately to the archive and to its contents.
+        lock(&self.size).bytes = 0;
         blocking(move || {
             let unpacked = File::open(&path)
                 .map_err(|source| Error::Read { path: path.clone(), source }.into())
                 .and_then(|file| self.unpack_file(file));
-            // What stays is removed with the upload.
+            // A remaining file is removed with the upload.
             let _ = std::fs::remove_file(&path);
             unpacked.map(|()| self.view())
         })
@@ -178,7 +182,7 @@ impl Upload {
 
     fn unpack_file(&self, file: File) -> ApiResult<()> {
         let mut archive = ZipArchive::new(file).map_err(|error| damaged(&error))?;
-        // Checked before anything is written.
+        // Checked before any file is written.
         self.limits.check_upload_files(archive.len())?;
         for index in 0..archive.len() {
             let mut entry = archive.by_index(index).map_err(|error| damaged(&error))?;
@@ -193,7 +197,7 @@ impl Upload {
             let detail = format!("zip: “{}” is a link.", shown(&name));
             return Err(ApiError::invalid("zip", detail).hint("Pack the files themselves (zip without -y)."));
         }
-        let path = self.place(name.trim_end_matches('/'), "zip")?;
+        let path = self.destination(name.trim_end_matches('/'), "zip")?;
         if entry.is_dir() {
             let made = std::fs::create_dir_all(&path);
             return made.map_err(|source| Error::Write { path, source }.into());
@@ -214,8 +218,8 @@ impl Upload {
         }
     }
 
-    /// The path of a name in the folder of the upload.
-    fn place(&self, name: &str, field: &str) -> ApiResult<PathBuf> {
+    /// The path of a file in the folder of the upload.
+    fn destination(&self, name: &str, field: &str) -> ApiResult<PathBuf> {
         let is_normal = |part: Component<'_>| matches!(part, Component::Normal(_));
         let stays = !name.is_empty() && Path::new(name).components().all(is_normal);
         if !stays || name.contains(['\\', '\0', ':']) || name.starts_with(ARCHIVE) {
@@ -231,17 +235,17 @@ impl Upload {
     }
 
     fn take_file(&self) -> ApiResult<()> {
-        let mut used = lock(&self.used);
-        self.limits.check_upload_files(used.files + 1)?;
-        used.files += 1;
+        let mut size = lock(&self.size);
+        self.limits.check_upload_files(size.files + 1)?;
+        size.files += 1;
         Ok(())
     }
 
     fn take_bytes(&self, count: usize) -> ApiResult<()> {
         let limit = &self.limits.upload_bytes;
-        let mut used = lock(&self.used);
-        used.bytes += count as u64;
-        if used.bytes <= limit.count() as u64 {
+        let mut size = lock(&self.size);
+        size.bytes += count as u64;
+        if size.bytes <= limit.count() as u64 {
             return Ok(());
         }
         let detail = format!("The upload has more than {} bytes.", limit.count());
@@ -252,7 +256,7 @@ impl Upload {
 }
 
 impl Limits {
-    /// Refuses an upload of too many files.
+    /// Rejects an upload with too many files.
     fn check_upload_files(&self, count: usize) -> ApiResult<()> {
         if count <= self.upload_files.count() {
             return Ok(());
@@ -262,7 +266,7 @@ impl Limits {
     }
 }
 
-/// A new file, with the folders above it.
+/// Creates a new file and its parent folders.
 fn create(path: &Path, name: &str) -> ApiResult<File> {
     let failed = |source| ApiError::from(Error::Write { path: path.to_owned(), source });
     path.parent().map_or(Ok(()), std::fs::create_dir_all).map_err(failed)?;

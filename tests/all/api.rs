@@ -1,4 +1,4 @@
-//! Sessions over HTTP: pick, run, go back, fork, cancel, restart.
+//! Sessions over HTTP: pick, run, step back, fork, cancel, restart.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -9,7 +9,7 @@ use sightline_api::wire::StopDetail;
 use sightline_tests::server::{PIXEL, TestServer, request, small_drive, small_recording};
 use sightline_vision::image::{npy, npz};
 
-/// Where the steps of a run are.
+/// The path of a step of a run.
 fn step(session: &str, run: u64, step: u64) -> String {
     format!("sessions/{session}/targets/0/runs/{run}/steps/{step}")
 }
@@ -32,7 +32,7 @@ async fn a_picked_target_is_tracked_to_the_last_stop() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_same_target_can_be_named_by_pixel_by_rover_point_and_by_site_point() {
+async fn pixel_rover_point_and_site_point_name_the_same_target() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), folder.path());
     let session = server.begin().await;
@@ -85,7 +85,7 @@ async fn a_target_keeps_its_new_name_over_a_restart() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_light_of_a_target_is_a_table_with_a_line_for_every_accepted_update() {
+async fn photometry_has_a_row_per_accepted_update() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), folder.path());
     let session = server.begin().await;
@@ -103,7 +103,7 @@ async fn the_light_of_a_target_is_a_table_with_a_line_for_every_accepted_update(
         let light = index.light(line[0].parse().unwrap(), &std::sync::atomic::AtomicBool::new(false));
         let exposure_s = light.unwrap().unwrap().exposure_s.unwrap();
         assert!((number(4) * exposure_s - number(1)).abs() < 1e-9, "{line:?}");
-        // Incidence, emission and phase are the sides of a spherical triangle.
+        // Incidence, emission and phase angles are the sides of a spherical triangle.
         let (incidence, emission, phase) = (number(5), number(6), number(7));
         assert!(phase <= incidence + emission + 1e-6 && phase >= (incidence - emission).abs() - 1e-6);
         assert!(emission < 90.0, "the surface is seen from in front: {line:?}");
@@ -134,7 +134,7 @@ async fn going_back_is_a_read_of_the_same_bytes() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn rows_that_are_new_and_a_cursor_that_moved_travel_without_the_session() {
+async fn new_rows_and_cursor_moves_are_sent_without_the_session() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), folder.path());
     let session = server.begin().await;
@@ -160,7 +160,7 @@ async fn rows_that_are_new_and_a_cursor_that_moved_travel_without_the_session() 
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn every_array_is_a_numpy_file_of_the_size_that_the_step_says() {
+async fn every_array_is_a_numpy_file_of_the_declared_size() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), folder.path());
     let session = server.begin().await;
@@ -171,7 +171,7 @@ async fn every_array_is_a_numpy_file_of_the_size_that_the_step_says() {
     let mut together: BTreeMap<_, _> = npz::decode(&together.bytes, "arrays").unwrap().into_iter().collect();
     for name in ["reference", "scaled", "rolled", "matched", "difference", "right_window", "surface"] {
         let image = npy::decode(&together.remove(name).unwrap(), name).unwrap();
-        // The surface has a score wherever the whole template lies in the search window.
+        // The score map has a score wherever the whole template is inside the search window.
         let window = &trace["locate"]["evidence"]["match_template"]["search_window"];
         let positions = |key: &str| window[key].as_u64().map(|side| side - 20);
         let said = |key: &str| if name == "surface" { positions(key) } else { Some(21) };
@@ -230,7 +230,7 @@ async fn a_fork_shares_the_steps_before_it_and_changes_none_of_them() {
     }
     assert_eq!(fork["rows"][3]["state"], json!("lost"), "{fork}");
     assert_eq!(server.ended(&session, 0, 0).await, parent);
-    // From the designation's own step on, the target is designated anew.
+    // A fork from the designation's own step designates the target again.
     let again = json!({ "run": 1, "from_step": 0 });
     server.post(&format!("sessions/{session}/targets/0/runs"), &again).await.expect(202);
     let again = server.ended(&session, 0, 2).await;
@@ -255,7 +255,7 @@ async fn a_stop_without_its_image_is_a_fault_of_that_step_alone() {
     assert!(run["rows"][4]["ncc"].as_f64().unwrap() > 0.8, "{run}");
     let image = format!("traverses/{}/steps/2/images/right.png", server.traverse);
     assert!(server.get(&image).await.problem(422, "file").contains("step 2"));
-    // The other eye of that stop and the next stop are there.
+    // The other image of that stop and the next stop exist.
     for there in ["2/images/left.png", "3/images/right.png"] {
         let path = format!("traverses/{}/steps/{there}", server.traverse);
         assert_eq!(server.get(&path).await.status, 200, "{there}");
@@ -263,7 +263,7 @@ async fn a_stop_without_its_image_is_a_fault_of_that_step_alone() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_stop_tells_its_cameras() {
+async fn a_stop_contains_its_camera_models() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), folder.path());
     let path = format!("traverses/{}/steps", server.traverse);
@@ -273,7 +273,7 @@ async fn a_stop_tells_its_cameras() {
     assert_eq!(serde_json::to_value(&detail.stop).unwrap(), view["stops"][1]);
     let open = &server.state.traverses()[0].traverse;
     assert_eq!((&detail.left, &detail.right), (open.left_camera(1), open.right_camera(1)));
-    // The eyes stand 15 cm apart or so, above the ground, and the mast has turned.
+    // The baseline is about 15 cm, and the mast angles are known.
     let apart_m = (detail.left.model.centre() - detail.right.model.centre()).norm();
     assert!((0.05..0.5).contains(&apart_m) && detail.mast.is_some(), "{apart_m} m");
     assert!(server.get(&format!("{path}/99")).await.problem(404, "not_found").contains("no step 99"));
@@ -312,7 +312,7 @@ async fn stops_ahead_of_the_cursor_are_rendered_unasked() {
         let event = serde_json::to_value(event).unwrap();
         order.extend(event["ready"].as_u64().filter(|_| event["event"] == json!("render_progress")));
     }
-    // Stops 0 and 1 may have been under way already.
+    // Stops 0 and 1 may have been in progress already.
     let place = |step: u64| order.iter().position(|done| *done == step);
     assert!(place(3) < place(4) && place(4) < place(2), "{order:?}");
     let view = server.get(&format!("traverses/{}", server.traverse)).await.expect(200);
@@ -322,7 +322,7 @@ async fn stops_ahead_of_the_cursor_are_rendered_unasked() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_cancelled_run_gains_no_step_until_it_is_resumed() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
-    // Without images each step has to be rendered first, so the run is still under way.
+    // Without images each step has to be rendered first, so the run is still in progress.
     std::fs::remove_dir_all(drive.path().join("images")).unwrap();
     let server = TestServer::open(drive.path(), folder.path());
     let session = server.begin().await;
@@ -379,7 +379,7 @@ async fn sessions_survive_the_server() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_removed_target_is_gone_and_its_number_is_not_used_again() {
+async fn the_number_of_a_removed_target_is_not_reused() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), folder.path());
     let session = server.begin().await;

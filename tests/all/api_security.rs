@@ -1,4 +1,4 @@
-//! What the server refuses, and that it goes on afterwards.
+//! Requests that the server refuses; afterwards it continues to work.
 
 use std::net::SocketAddr;
 
@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use sightline_tests::server::{PIXEL, PORT, TOKEN, TestServer, access, request, small_drive};
 use tokio_tungstenite::tungstenite::{self, Message};
 
-/// A server with a session, and what keeps its folders.
+/// A server with a session, and its folders.
 async fn server() -> (TestServer, String, [tempfile::TempDir; 2]) {
     let folders = [small_drive(), tempfile::tempdir().unwrap()];
     let server = TestServer::open(folders[0].path(), folders[1].path());
@@ -18,7 +18,7 @@ async fn server() -> (TestServer, String, [tempfile::TempDir; 2]) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_cannot_be_designated_is_said_in_one_sentence() {
+async fn invalid_designations_are_rejected_in_one_sentence() {
     let (server, session, _folders) = server().await;
     let path = format!("sessions/{session}/targets");
     let refused = |body: Value| {
@@ -46,7 +46,7 @@ async fn what_cannot_be_designated_is_said_in_one_sentence() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_cannot_be_read_is_refused() {
+async fn unreadable_requests_are_rejected() {
     let (server, session, _folders) = server().await;
     let path = format!("sessions/{session}/targets");
     let with = |media_type: &'static str, body: &'static str| {
@@ -81,7 +81,7 @@ async fn what_cannot_be_read_is_refused() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn names_that_do_not_exist_are_not_found_however_they_are_written() {
+async fn unknown_names_are_not_found_in_any_spelling() {
     let (server, session, _folders) = server().await;
     server.pick(&session).await;
     let traverse = &server.traverse;
@@ -174,7 +174,7 @@ async fn other_sites_are_refused_before_any_route() {
     assert_eq!(server.get(&format!("sessions/{session}")).await.expect(200), before);
 }
 
-/// Serves on a free port of this machine; the port is that of the server's own belief.
+/// Serves on a free port of this machine, which is also the port in the server's own address.
 async fn bound() -> (SocketAddr, TestServer, [tempfile::TempDir; 2]) {
     let folders = [small_drive(), tempfile::tempdir().unwrap()];
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
@@ -185,7 +185,7 @@ async fn bound() -> (SocketAddr, TestServer, [tempfile::TempDir; 2]) {
     let app = sightline_server::app(state.clone());
     tokio::spawn(async move { axum::serve(listener, app).await });
     let traverse = state.traverses()[0].id.clone();
-    // Requests in process still use the usual port and would be refused; only the events are used here.
+    // Requests passed to the router use the usual port and would be refused; only the events are used here.
     (address, TestServer { app: sightline_server::app(state.clone()), state, traverse }, folders)
 }
 
@@ -224,12 +224,12 @@ async fn every_page_hears_what_changes_and_a_flood_hurts_nobody() {
     let (address, server, _folders) = bound().await;
     let (mut socket, _) = tokio_tungstenite::connect_async(events_request(address)).await.unwrap();
     let (mut flooding, _) = tokio_tungstenite::connect_async(events_request(address)).await.unwrap();
-    // A message above the limit ends that connection only.
+    // A message above the limit ends only that connection.
     let _ = flooding.send(Message::text("x".repeat(200_000))).await;
     socket.send(Message::text("{\"anything\": 1}")).await.unwrap();
     let traverse = server.state.traverse(&server.traverse).unwrap();
     let live = server.state.begin_session(traverse).unwrap();
-    let told = async {
+    let received = async {
         loop {
             let Some(Ok(message)) = socket.next().await else { panic!("the connection ended") };
             if message.to_text().is_ok_and(|text| text.contains("session_changed") && text.contains(&live.id))
@@ -238,7 +238,7 @@ async fn every_page_hears_what_changes_and_a_flood_hurts_nobody() {
             }
         }
     };
-    tokio::time::timeout(std::time::Duration::from_secs(20), told).await.unwrap();
+    tokio::time::timeout(std::time::Duration::from_secs(20), received).await.unwrap();
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -251,7 +251,7 @@ async fn the_document_describes_every_route_and_names_each_once() {
         for (method, operation) in item.as_object().unwrap() {
             assert!(names.insert(operation["operationId"].to_string()), "{path}: its name is used twice");
             assert!(operation["responses"].as_object().is_some_and(|all| !all.is_empty()), "{path}");
-            // Every path of the document is a route: nothing that is there answers that there is no such route.
+            // Every path of the document is a route: none returns the error for an unknown route.
             let path = path
                 .replace("{session}", &session)
                 .replace("{id}", "none")
@@ -270,7 +270,7 @@ async fn the_document_describes_every_route_and_names_each_once() {
         let name = reference.split('"').next().unwrap();
         assert!(document["components"]["schemas"].get(name).is_some(), "{name} is not described");
     }
-    // Its readers know the papers, not the numbers of our requirements.
+    // Readers of the document have the papers, not our requirement numbers.
     let is_number = |word: &&str| {
         word.strip_prefix('R').is_some_and(|rest| {
             (1..=3).contains(&rest.len()) && rest.bytes().all(|letter| letter.is_ascii_digit())

@@ -1,4 +1,4 @@
-//! Limits are settings: what exceeds one is refused by its name, slow clients lock nobody out, and memory has a ceiling.
+//! Limits are settings: a refusal names the exceeded limit, slow clients cannot block the server, and memory is bounded.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -15,9 +15,9 @@ use sightline_server::state::AppState;
 use sightline_tests::server::{Answer, PIXEL, PORT, TOKEN, TestServer, access, small_drive, small_scenario};
 use sightline_world::Scenario;
 
-use crate::keeping::Killable;
+use crate::persistence::ServerProcess;
 
-/// How long a test waits for what does not take long.
+/// Maximum time for an operation that should be quick.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 fn moved(limits: &[&str]) -> Limits {
@@ -37,7 +37,7 @@ fn serve(drive: &Path, sessions: &Path, limits: &[&str]) -> TestServer {
     TestServer { app: app(state.clone()), state, traverse }
 }
 
-/// Asserts that an answer is a problem that names the limit and how to raise it.
+/// Asserts that a response is a problem that names the limit and how to raise it.
 fn names(answer: &Answer, status: u16, code: &str, raised: &str) {
     answer.problem(status, code);
     let hint = answer.json()["hint"].as_str().unwrap_or_default().to_owned();
@@ -49,7 +49,7 @@ async fn usage(server: &TestServer, part: &str) -> u64 {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_exceeds_a_limit_is_refused_by_its_name() {
+async fn exceeding_a_limit_is_rejected_by_its_name() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let limits =
         ["sessions=1", "targets=1", "runs=1", "drives=1", "body_bytes=3000", "file_bytes=4000", "stops=5"];
@@ -70,7 +70,7 @@ async fn what_exceeds_a_limit_is_refused_by_its_name() {
     names(&server.post("traverses", &long).await, 413, "too_large", "body_bytes=6000");
     let file = json!({ "traverse": "x".repeat(4000) });
     names(&server.post("sessions/reproduced", &file).await, 413, "too_large", "file_bytes=8000");
-    // A session file is larger than other bodies may be.
+    // A session file may be larger than other bodies.
     let file = json!({ "traverse": "x".repeat(3500) });
     server.post("sessions/reproduced", &file).await.problem(422, "field");
     let longer =
@@ -89,7 +89,7 @@ fn a_drive_beyond_the_limits_is_not_served() {
     assert!(refused("stops=4").contains("--limit stops=8"));
 }
 
-/// A drive whose first stop is there, and whose other stops take many seconds to render: 134 million samples each.
+/// A drive whose first stop is rendered, and whose other stops take many seconds: 134 million samples each.
 fn slow_to_render() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let mut scenario = small_scenario();
@@ -140,7 +140,7 @@ async fn sessions_rest_when_the_steps_of_others_need_their_memory() {
     let same = |run: &Value| run["rows"] == rows;
     assert!(same(&server.ended(&other, 0, 0).await));
     assert!(usage(&server, "step_bytes").await < 2 * of_one, "the first session rests");
-    // Asked for again, it is computed again, with the same bits.
+    // On request it is computed again, with the same bits.
     assert!(same(&server.ended(&one, 0, 0).await));
     server.json(Method::DELETE, &format!("sessions/{one}"), &json!({})).await;
     server.json(Method::DELETE, &format!("sessions/{other}"), &json!({})).await;
@@ -191,9 +191,9 @@ async fn images_of_all_drives_share_one_ceiling() {
     assert!(usage(&server, "cache_bytes").await > 1_000_000, "two pairs fit");
 }
 
-/// Waits until a server has at most so many connections, the one that asks included.
+/// Waits until a server has at most `most` connections, including the one of the request.
 #[cfg(unix)]
-fn until_connections(server: &Killable, most: u64) {
+fn until_connections(server: &ServerProcess, most: u64) {
     let begun = Instant::now();
     loop {
         let open = server.get("health")["usage"]["connections"].as_u64().unwrap();
@@ -205,9 +205,9 @@ fn until_connections(server: &Killable, most: u64) {
     }
 }
 
-/// A WebSocket on which the server tells its events, by hand.
+/// Opens the WebSocket of events by hand.
 #[cfg(unix)]
-fn listen(server: &Killable) -> TcpStream {
+fn listen(server: &ServerProcess) -> TcpStream {
     let mut stream = TcpStream::connect(&server.address).unwrap();
     let head = format!(
         "GET /api/v1/events HTTP/1.1\r\nHost: {}\r\nAuthorization: Bearer {TOKEN}\r\nConnection: Upgrade\r\n\
@@ -223,10 +223,10 @@ fn listen(server: &Killable) -> TcpStream {
 
 #[cfg(unix)]
 #[test]
-fn connections_that_dribble_lock_nobody_out() {
+fn slow_connections_lock_nobody_out() {
     let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
-    // The system allows 140 descriptors, so that there are 44 connections at most.
-    let server = Killable::start_bounded(140, &["header_s=3"], drive.path(), data.path());
+    // With 140 descriptors permitted by the system, there are at most 44 connections.
+    let server = ServerProcess::start_bounded(140, &["header_s=3"], drive.path(), data.path());
     let mut page = listen(&server);
     let mut slow: Vec<TcpStream> = Vec::new();
     for number in 0..200 {
@@ -239,21 +239,21 @@ fn connections_that_dribble_lock_nobody_out() {
             assert!(open <= 46, "{open} connections");
         }
     }
-    // The page, and the one that asks.
+    // The page, and the connection of the request.
     until_connections(&server, 2);
     let traverse = server.get("traverses")[0]["id"].clone();
     server.json("POST", "sessions", &json!({ "traverse": traverse }));
-    let mut told = Vec::new();
+    let mut received = Vec::new();
     page.set_read_timeout(Some(PATIENCE)).unwrap();
-    while !String::from_utf8_lossy(&told).contains("session_changed") {
+    while !String::from_utf8_lossy(&received).contains("session_changed") {
         let mut some = [0; 512];
         let count = page.read(&mut some).unwrap();
         assert_ne!(count, 0, "the page hears events still");
-        told.extend_from_slice(&some[..count]);
+        received.extend_from_slice(&some[..count]);
     }
     for mut stream in slow {
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
-        // An end, an answer that says why, or a reset.
+        // The end of the stream, a response with the reason, or a reset.
         let _ = stream.read_to_end(&mut Vec::new());
     }
 }
@@ -261,7 +261,7 @@ fn connections_that_dribble_lock_nobody_out() {
 #[test]
 fn a_body_that_is_announced_as_too_large_is_refused_at_once() {
     let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
-    let server = Killable::start(drive.path(), data.path());
+    let server = ServerProcess::start(drive.path(), data.path());
     let mut stream = TcpStream::connect(&server.address).unwrap();
     let head = format!(
         "POST /api/v1/sessions HTTP/1.1\r\nHost: {}\r\nAuthorization: Bearer {TOKEN}\r\n\
@@ -270,7 +270,7 @@ fn a_body_that_is_announced_as_too_large_is_refused_at_once() {
     );
     stream.write_all(head.as_bytes()).unwrap();
     stream.set_read_timeout(Some(PATIENCE)).unwrap();
-    // Not a byte of the body was sent: the server does not wait for it.
+    // No byte of the body was sent: the server does not wait for it.
     let mut status = [0; 12];
     stream.read_exact(&mut status).unwrap();
     assert_eq!(&status, b"HTTP/1.1 413");
@@ -278,15 +278,15 @@ fn a_body_that_is_announced_as_too_large_is_refused_at_once() {
 
 #[cfg(unix)]
 #[test]
-fn clients_that_take_no_answer_are_cut_off() {
+fn clients_that_read_no_answer_are_disconnected() {
     let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
-    let server = Killable::start_bounded(1024, &["send_s=1"], drive.path(), data.path());
+    let server = ServerProcess::start_bounded(1024, &["send_s=1"], drive.path(), data.path());
     let traverse = server.get("traverses")[0]["id"].as_str().unwrap().to_owned();
     let path = format!("/api/v1/traverses/{traverse}/steps/0/images/left.png?bits=16");
     let request =
         format!("GET {path} HTTP/1.1\r\nHost: {}\r\nAuthorization: Bearer {TOKEN}\r\n\r\n", server.address);
     let mut deaf = TcpStream::connect(&server.address).unwrap();
-    // More than the system takes on the way.
+    // More than fits into the buffers of the system.
     deaf.write_all(request.repeat(300).as_bytes()).unwrap();
     until_connections(&server, 1);
     drop(deaf);

@@ -1,4 +1,5 @@
-//! Several cameras a stop over REST and in recordings: listed, shown by name, designated in, and refused with a sentence.
+//! Several cameras per stop over REST and in recordings: listed, shown by name, used for designation, and refused with an
+//! error.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -21,7 +22,8 @@ fn name(text: &str) -> CameraName {
     text.parse().unwrap()
 }
 
-/// The small drive with pancams, which stop 2 lacks, and hazcams, of which stop 1 has the left one alone; nothing is rendered.
+/// The small drive with pancams, which stop 2 lacks, and hazcams, of which stop 1 has only the left one; nothing is
+/// rendered.
 fn drive(folder: &Path) -> Traverse {
     let mut scenario = small_scenario();
     let further =
@@ -38,7 +40,7 @@ fn drive(folder: &Path) -> Traverse {
     Traverse::open(folder).unwrap()
 }
 
-/// The place of [`PIXEL`] in the first image of the pancams.
+/// The pixel of the pancams' first left image that shows the target at [`PIXEL`].
 fn pixel_in_pancam(traverse: &Traverse) -> Pixel {
     let point = traverse.surface_point_in_site(0, None, Pixel::new(PIXEL[0], PIXEL[1])).unwrap();
     let in_rover = traverse.true_site_from_rover(0).unwrap().inverse_transform_point(&point);
@@ -84,7 +86,7 @@ async fn cameras_are_listed_and_their_images_are_served_by_name() {
     let wrong = server.get(&images("1/images/left.png?camera=../x")).await.problem(422, "query");
     assert!(wrong.contains("is no name of a camera"), "{wrong}");
 
-    // A drive with its main pair alone says nothing new.
+    // A drive with only its main pair has no new fields.
     let (plain, sessions) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(plain.path(), sessions.path());
     let view = server.get(&format!("traverses/{}", server.traverse)).await.expect(200);
@@ -92,7 +94,7 @@ async fn cameras_are_listed_and_their_images_are_served_by_name() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_target_is_designated_in_a_pair_by_its_name_and_kept_with_it() {
+async fn a_target_keeps_the_pair_in_which_it_was_designated() {
     let (folder, sessions) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let traverse = drive(folder.path());
     let Pixel { x, y } = pixel_in_pancam(&traverse);
@@ -117,7 +119,7 @@ async fn a_target_is_designated_in_a_pair_by_its_name_and_kept_with_it() {
         assert_eq!(row["state"], "tracking", "stop {step}: {row}");
     }
     assert!(!server.state.traverses()[0].traverse.is_rendered(3, Some(name("front_hazcam"))));
-    // The session file has the name, and a server that starts anew computes the same.
+    // The session file contains the name, and a restarted server computes the same.
     drop(server);
     let server = TestServer::open(folder.path(), sessions.path());
     let view = server.get(&format!("sessions/{session}")).await.expect(200);
@@ -136,7 +138,7 @@ fn a_recording_has_the_images_and_pyramids_of_further_cameras() {
     let designation =
         Designation { step: 0, pixel: pixel_in_pancam(&traverse), camera: Some(name("pancam")) };
     let steps = track::run(&traverse, designation, &Settings::default()).unwrap();
-    // The hazcams of one stop were looked at: their images are there without being rendered.
+    // The hazcam image of one stop was requested: it exists and is not rendered again.
     traverse.capture_one(3, Some(name("front_hazcam")), true).unwrap();
     let steps: Vec<_> = steps.into_iter().map(Arc::new).collect();
     let last = steps.len() as i64 - 1;

@@ -1,4 +1,4 @@
-//! The command line: results, exit codes and sentences; and that it computes what the server computes.
+//! The command line: results, exit codes and messages; its results equal those of the server.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -6,7 +6,7 @@ use std::process::{Command, Output, Stdio};
 use serde_json::{Value, json};
 use sightline_tests::server::{PIXEL, TOKEN, TestServer, rows_of_run, small_drive, small_scenario};
 
-/// The program: the one named by `SIGHTLINE_BIN`, else the one beside this test.
+/// The program: the one named by `SIGHTLINE_BIN`, otherwise the one beside this test.
 pub(crate) fn program() -> PathBuf {
     if let Some(named) = std::env::var_os("SIGHTLINE_BIN") {
         return named.into();
@@ -22,7 +22,7 @@ fn run(arguments: &[&str]) -> Output {
     Command::new(program()).args(arguments).env("SIGHTLINE_HOME", home.path()).output().unwrap()
 }
 
-/// Asserts a failure with that exit code, nothing on the standard output, and one sentence that names `culprit`.
+/// Asserts a failure with that exit code, an empty standard output, and one sentence that names `culprit`.
 fn refused(arguments: &[&str], code: i32, culprit: &str) {
     let output = run(arguments);
     let complaint = String::from_utf8_lossy(&output.stderr);
@@ -89,13 +89,13 @@ fn info_writes_no_control_characters_of_a_file() {
     let named = std::fs::read_to_string(&index).unwrap().replacen("small drive", "\\u001b[31mred\\u0007", 1);
     std::fs::write(&index, named).unwrap();
     let output = run(&["info", text(drive.path())]);
-    let said = String::from_utf8(output.stdout).unwrap();
-    assert!(output.status.success() && said.contains("name          [31mred"), "{said:?}");
-    assert!(said.chars().all(|c| c == '\n' || !c.is_control()), "{said:?}");
+    let output_text = String::from_utf8(output.stdout).unwrap();
+    assert!(output.status.success() && output_text.contains("name          [31mred"), "{output_text:?}");
+    assert!(output_text.chars().all(|c| c == '\n' || !c.is_control()), "{output_text:?}");
 }
 
 #[test]
-fn a_taken_port_is_said_with_the_way_out() {
+fn a_port_in_use_is_reported_with_a_way_out() {
     let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let port = taken.local_addr().unwrap().port().to_string();
     refused(&["serve", text(small_drive().path()), "--port", &port], 3, "--port");
@@ -166,7 +166,7 @@ async fn server_and_command_line_give_the_same_rows_to_the_last_digit() {
 }
 
 #[test]
-fn serve_says_one_line_and_survives_being_killed() {
+fn serve_prints_one_line_and_survives_being_killed() {
     let (drive, home) = (small_drive(), tempfile::tempdir().unwrap());
     let start = || {
         let mut server = Command::new(program())
@@ -198,7 +198,7 @@ fn serve_says_one_line_and_survives_being_killed() {
     server.wait().unwrap();
 }
 
-/// The body of the answer to one request.
+/// Returns the body of the response to one request.
 fn http(address: &str, method: &str, path: &str, body: &str) -> String {
     use std::io::{Read, Write};
     let mut stream = std::net::TcpStream::connect(address).unwrap();

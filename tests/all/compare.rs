@@ -1,9 +1,9 @@
-//! Runs side by side over HTTP, and the metrics of one.
+//! Comparison of runs over HTTP, and the metrics of a run.
 
 use serde_json::{Value, json};
 use sightline_tests::server::{TestServer, small_drive};
 
-/// A session with a complete run and a fork of it from step 3 that asks for a perfect match.
+/// A session with a complete run and a fork of it from step 3 that requires a perfect match.
 async fn forked(server: &TestServer) -> String {
     let session = server.begin().await;
     server.pick(&session).await;
@@ -19,7 +19,7 @@ fn runs(numbers: &[usize]) -> Value {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_comparison_says_where_a_fork_differs_first_and_which_setting_does() {
+async fn a_comparison_finds_first_divergence_and_changed_setting() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), folder.path());
     let session = forked(&server).await;
@@ -44,15 +44,15 @@ async fn a_comparison_says_where_a_fork_differs_first_and_which_setting_does() {
         "px2": 1e9, "m": 1e9, "m2": 1e9, "rad": 9.0, "deg": 999.0, "s": 1e9 } });
     let found = server.post(&path, &alike).await.expect(200);
     assert_eq!((&found["columns"], &found["align"]), (&json!([]), &json!("distance")));
-    let told = &found["first"][0]["divergence"]["values"][0];
+    let values = &found["first"][0]["divergence"]["values"][0];
     assert!(
-        told["a"].is_string() || told["a"].is_boolean() || told["a"].is_null(),
-        "only words differ: {told}"
+        values["a"].is_string() || values["a"].is_boolean() || values["a"].is_null(),
+        "only words differ: {values}"
     );
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_cannot_be_compared_is_refused_with_the_field_and_the_fix() {
+async fn invalid_comparisons_are_rejected_with_the_field() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), folder.path());
     let session = forked(&server).await;

@@ -1,5 +1,5 @@
-//! Drives on commands by REST: the same bits as by the command line, pausing, changing settings, branching, and going on after
-//! a kill.
+//! Drives on commands by REST: the same bits as on the command line, pausing, changing settings, branching, and continuing
+//! after a kill.
 
 use std::path::Path;
 use std::process::Command;
@@ -10,16 +10,16 @@ use serde_json::{Value, json};
 use sightline_tests::server::{PIXEL, TestServer, small_drive, small_recording};
 
 use crate::cli::program;
-use crate::keeping::Killable;
+use crate::persistence::ServerProcess;
 
-/// How long a drive of a few small stops may take.
+/// Maximum time of a drive of a few small stops.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 pub(crate) fn command() -> Value {
     json!({ "standoff_m": 3.0, "tolerance_m": 0.05, "stops_max": 7 })
 }
 
-/// Asks until the drive is as wanted.
+/// Polls until the drive is as wanted.
 pub(crate) fn wait(mut ask: impl FnMut() -> Value, wanted: impl Fn(&Value) -> bool) -> Value {
     let begun = Instant::now();
     loop {
@@ -57,7 +57,7 @@ pub(crate) fn waits_at(stop: usize) -> impl Fn(&Value) -> bool {
     move |drive| last_cycle(drive)["step"] == json!(stop) && drive["is_driving"] == json!(false)
 }
 
-/// The drive of the command line in the small drive's world: rows without their cycles, cycles, and the summary.
+/// The drive by the command line in the small drive's world: rows without their cycles, cycles, and the summary.
 pub(crate) fn by_command_line(drive: &Path) -> (Vec<Value>, Vec<Value>, Value) {
     let [x, y] = PIXEL;
     let mut program = Command::new(program());
@@ -87,7 +87,7 @@ pub(crate) async fn exported(server: &TestServer, session: &str, run: u64) -> Ve
     rows(&server.get(&format!("sessions/{session}/exports/rows.jsonl?target=0&run={run}")).await.text())
 }
 
-/// Begins to drive with the first run of a target at the first stop, and returns the session of the drive.
+/// Starts a drive with the first run of a target at the first stop, and returns the session of the drive.
 pub(crate) async fn begin(server: &TestServer, new: &Value) -> String {
     let session = server.begin().await;
     server.pick(&session).await;
@@ -106,21 +106,21 @@ async fn a_drive_by_rest_has_the_bits_of_the_command_line() {
     assert_eq!(ended["cycles"], json!(cycles));
     assert_eq!(ended["summary"], summary);
     assert_eq!(exported(&server, &session, 0).await, wanted);
-    // The session from which it began is as it was.
+    // The session from which it started is unchanged.
     assert_eq!(server.get("sessions/s1/drive").await.expect(200)["steering"], json!(null));
 
     // The exported session is the same elsewhere.
     let bundle = server.get(&format!("sessions/{session}/exports/reproduce.json")).await.json();
     let elsewhere = tempfile::tempdir().unwrap();
     let other = TestServer::open(drive.path(), elsewhere.path());
-    let brought =
+    let reproduced =
         other.post("sessions/reproduced", &bundle).await.expect(201)["id"].as_str().unwrap().to_owned();
-    waited(&other, &brought, has_ended).await;
-    assert_eq!(exported(&other, &brought, 0).await, wanted);
+    waited(&other, &reproduced, has_ended).await;
+    assert_eq!(exported(&other, &reproduced, 0).await, wanted);
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_drive_waits_goes_on_with_other_settings_and_branches() {
+async fn a_drive_pauses_resumes_with_new_settings_and_branches() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let (wanted, ..) = by_command_line(drive.path());
     let server = TestServer::open(drive.path(), folder.path());
@@ -141,11 +141,11 @@ async fn a_drive_waits_goes_on_with_other_settings_and_branches() {
     let trunk = exported(&server, &session, 1).await;
     assert_eq!(ended["summary"]["stops"], json!(trunk.len()));
     assert_eq!(trunk[..3], wanted[..3]);
-    // The run that drove before was tracked along.
+    // The run that drove before was tracked to the end as well.
     server.ended(&session, 0, 0).await;
     assert_eq!(exported(&server, &session, 0).await.len(), trunk.len());
 
-    // From stop 2 the first run drives on in a world of its own, as if it had never waited.
+    // From stop 2 the first run drives in a world of its own, with the same result as without a pause.
     let image = format!("traverses/{}/steps/4/images/left.png", traverse_of(&server, &session).await);
     let seen = server.get(&image).await.bytes;
     let new = json!({ "command": command(), "from_step": 2 });
@@ -155,7 +155,7 @@ async fn a_drive_waits_goes_on_with_other_settings_and_branches() {
     assert_eq!(exported(&server, &branch, 0).await, wanted);
     assert_eq!(exported(&server, &session, 1).await, trunk);
 
-    // From the same stop the second run drives on with its own settings, which it took up only at stop 3.
+    // From the same stop the second run drives with its own settings, which it uses from stop 3 on.
     let begun = server.post(&format!("sessions/{session}/targets/0/runs/1/drive"), &new).await.expect(201);
     let branch = begun["id"].as_str().unwrap().to_owned();
     let ended = waited(&server, &branch, has_ended).await;
@@ -173,10 +173,10 @@ pub(crate) async fn traverse_of(server: &TestServer, session: &str) -> String {
 }
 
 #[test]
-fn a_drive_goes_on_with_the_same_bits_after_a_kill() {
+fn a_drive_continues_with_the_same_bits_after_a_kill() {
     let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
     let (wanted, cycles, _) = by_command_line(drive.path());
-    let server = Killable::start(drive.path(), data.path());
+    let server = ServerProcess::start(drive.path(), data.path());
     let traverse = server.get("traverses")[0]["id"].clone();
     server.json("POST", "sessions", &json!({ "traverse": traverse }));
     let [x, y] = PIXEL;
@@ -185,14 +185,14 @@ fn a_drive_goes_on_with_the_same_bits_after_a_kill() {
     let some = |drive: &Value| drive["cycles"].as_array().is_some_and(|cycles| cycles.len() >= 2);
     wait(|| server.get("sessions/s2/drive"), some);
     server.kill();
-    let server = Killable::start(drive.path(), data.path());
+    let server = ServerProcess::start(drive.path(), data.path());
     let ended = wait(|| server.get("sessions/s2/drive"), has_ended);
     assert_eq!(ended["cycles"], json!(cycles));
     let exported = server.raw("GET", "sessions/s2/exports/rows.jsonl?target=0&run=0", "", "");
     assert_eq!(rows(&exported), wanted);
     server.kill();
 
-    // The command line exports it without the server, and leaves its folder alone.
+    // The command line exports the drive without the server, and leaves its folder unchanged.
     let out = data.path().join("rows.jsonl");
     let mut command = Command::new(program());
     command.args(["export", "rows.jsonl", "--session", "s2", "--data-dir"]).arg(data.path());
@@ -202,7 +202,7 @@ fn a_drive_goes_on_with_the_same_bits_after_a_kill() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_cannot_be_driven_is_refused_in_a_sentence() {
+async fn invalid_drive_commands_are_rejected_in_one_sentence() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), folder.path());
     let session = server.begin().await;
@@ -246,7 +246,7 @@ async fn decisions_that_were_followed_stay_when_the_command_changes() {
     let followed = waits["cycles"].as_array().unwrap()[..2].to_vec();
     assert!(followed.iter().all(|cycle| cycle["report"] != json!(null)));
 
-    // The rest of the way in shorter steps.
+    // The rest of the drive uses shorter steps.
     let path = format!("sessions/{session}/drive");
     let short = json!({ "standoff_m": 4.5, "on_arrival": ["look"], "step_fraction": 0.07 });
     let steering = json!({ "target": 0, "run": 0, "command": short });
@@ -257,7 +257,7 @@ async fn decisions_that_were_followed_stay_when_the_command_changes() {
     assert_eq!(last_cycle(&arrived)["ending"]["reason"], "arrived");
     assert_eq!(last_cycle(&arrived)["arrival_actions"], 1);
 
-    // A nearer goal is driven to, with a look of its own.
+    // Then a nearer goal, with a look of its own.
     let near = json!({ "standoff_m": 4.0, "on_arrival": ["look"] });
     let steering = json!({ "target": 0, "run": 0, "command": near });
     server.json(Method::PUT, &path, &steering).await.expect(200);
@@ -268,7 +268,7 @@ async fn decisions_that_were_followed_stay_when_the_command_changes() {
     assert_eq!((&last["ending"]["reason"], &last["arrival_actions"]), (&json!("arrived"), &json!(1)));
     assert_eq!(ended["cycles"].as_array().unwrap()[..cycles.len() - 1], cycles[..cycles.len() - 1]);
 
-    // After a restart they are the same.
+    // They are the same after a restart.
     drop(server);
     let server = TestServer::open(drive.path(), folder.path());
     assert_eq!(waited(&server, &session, has_ended).await["cycles"], ended["cycles"]);

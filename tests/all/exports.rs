@@ -1,4 +1,4 @@
-//! Every file that a session can be exported as is what it says, also with hostile labels; and the plain pages.
+//! Every export of a session has the format of its name, also with hostile labels; and the plain pages.
 
 use std::path::Path;
 use std::process::Command;
@@ -12,10 +12,10 @@ use sightline_tests::server::{Answer, PIXEL, TestServer, rows_of_run, small_driv
 
 use crate::cli::program;
 
-/// A label that would be a formula, a script, two cells and a path.
+/// A label that could act as a formula, a script, two cells or a path.
 const HOSTILE: &str = "=1+1,\"<script>alert('x')</script>\r\n../../etc";
 
-/// A server with a session of a target with that label, a fork and two notes.
+/// A server with a session that has a target with that label, a fork and two notes.
 async fn session(drive: &Path, folder: &Path) -> TestServer {
     let server = TestServer::open(drive, folder);
     server.begin().await;
@@ -31,7 +31,7 @@ async fn session(drive: &Path, folder: &Path) -> TestServer {
     server
 }
 
-/// A file of the session, with its header checked.
+/// A file of the session; checks its headers.
 async fn file(server: &TestServer, name: &str, query: &str) -> Answer {
     let answer = server.get(&format!("sessions/s1/exports/{name}{query}")).await;
     assert_eq!(answer.status.as_u16(), 200, "{name}: {}", answer.text());
@@ -83,7 +83,7 @@ async fn the_tables_hold_the_same_rows_to_the_last_bit_and_no_formula() {
     }
 }
 
-/// The cells of a CSV table as RFC 4180 reads it.
+/// The cells of a CSV table, read by RFC 4180.
 fn cells(text: &str) -> Vec<Vec<String>> {
     let (mut rows, mut row, mut cell, mut quoted) = (Vec::new(), Vec::new(), String::new(), false);
     let mut rest = text.chars().peekable();
@@ -104,7 +104,7 @@ fn cells(text: &str) -> Vec<Vec<String>> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_animation_has_a_frame_for_every_step_and_the_sheet_a_picture() {
+async fn animation_and_sheet_have_one_image_per_step() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = session(drive.path(), folder.path()).await;
     let animation = file(&server, "steps.apng", "?target=0&run=0").await;
@@ -127,7 +127,7 @@ async fn the_animation_has_a_frame_for_every_step_and_the_sheet_a_picture() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_report_is_one_well_formed_page_without_scripts_remote_things_or_paths() {
+async fn the_report_is_self_contained_and_well_formed() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = session(drive.path(), folder.path()).await;
     let report = file(&server, "report.html", "").await;
@@ -161,7 +161,7 @@ async fn the_report_is_one_well_formed_page_without_scripts_remote_things_or_pat
     assert!(!remote.contains("http://") && !remote.contains("src=\"http"), "nothing remote");
 }
 
-/// Asserts that a page is well formed as XML is, but for the elements of HTML that have no end, and has no script in it.
+/// Asserts that a page is well-formed like XML, except for the void elements of HTML, and contains no script.
 fn safe(html: &str, what: &str) {
     const VOID: [&str; 6] = ["meta", "img", "br", "hr", "link", "!doctype"];
     let lower = html.to_lowercase();
@@ -194,7 +194,7 @@ fn safe(html: &str, what: &str) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_reproduce_bundle_names_settings_seed_hashes_and_a_command_that_gives_the_same_rows() {
+async fn the_command_of_a_bundle_reproduces_its_rows() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = session(drive.path(), folder.path()).await;
     let bundle: Value = serde_json::from_slice(&file(&server, "reproduce.json", "").await.bytes).unwrap();
@@ -213,7 +213,7 @@ async fn the_reproduce_bundle_names_settings_seed_hashes_and_a_command_that_give
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_list_of_exports_says_sizes_that_hold_and_commands() {
+async fn the_list_of_exports_has_sizes_and_commands() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = session(drive.path(), folder.path()).await;
     let list = server.get("sessions/s1/exports?target=0&run=1").await.expect(200);
@@ -221,11 +221,14 @@ async fn the_list_of_exports_says_sizes_that_hold_and_commands() {
     assert_eq!(entries.len(), 8);
     for entry in entries {
         let answer = server.get(entry["path"].as_str().unwrap()).await;
-        let (bytes, said) = (answer.bytes.len() as f64, entry["size"]["bytes"].as_f64().unwrap());
+        let (bytes, stated) = (answer.bytes.len() as f64, entry["size"]["bytes"].as_f64().unwrap());
         assert_eq!(answer.headers[header::CONTENT_LENGTH].to_str().unwrap(), bytes.to_string(), "{entry}");
         let exact = entry["size"]["is_exact"] == json!(true);
         let factor = if exact { 1.0 } else { 4.0 };
-        assert!(bytes <= factor * said && said <= factor * bytes, "{bytes} bytes, said {said}: {entry}");
+        assert!(
+            bytes <= factor * stated && stated <= factor * bytes,
+            "{bytes} bytes, said {stated}: {entry}"
+        );
         let command = entry["command"].as_str().unwrap();
         assert!(command.starts_with("sightline export ") && command.ends_with("--run 0/1"), "{command}");
     }
@@ -238,7 +241,7 @@ async fn the_list_of_exports_says_sizes_that_hold_and_commands() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_command_line_makes_the_very_same_files_also_while_the_server_runs() {
+async fn the_command_line_exports_identical_files() {
     let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
     let server = session(drive.path(), &data.path().join("sessions")).await;
     let folder = data.path().to_str().unwrap();
@@ -281,14 +284,14 @@ async fn the_command_line_makes_the_very_same_files_also_while_the_server_runs()
         (vec!["export", "rows.csv", "--session", "s1", "--data-dir", folder], 3, "name its folder"),
     ] {
         let output = Command::new(program()).args(&arguments).output().unwrap();
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {said}");
-        assert!(said.contains(culprit), "{arguments:?}: {said}");
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {stderr}");
+        assert!(stderr.contains(culprit), "{arguments:?}: {stderr}");
     }
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn every_step_is_a_plain_page_with_headings_tables_and_described_pictures() {
+async fn every_step_has_an_accessible_plain_page() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = session(drive.path(), folder.path()).await;
     for run in 0..2 {
@@ -372,7 +375,7 @@ async fn no_file_contains_the_folder_of_the_recording() {
             let bytes = file(&server, name, "").await.bytes;
             let contains = |text: &str| bytes.windows(text.len()).any(|window| window == text.as_bytes());
             assert!(!contains(place), "{name}");
-            // A recording is compressed, and a bundle has no reasons.
+            // A recording is compressed, and a bundle contains no reasons.
             let has_reasons = !matches!(name, "reproduce.json" | "recording.rrd");
             assert!(!has_reasons || contains("images/left_0002.png"), "{name}");
         }

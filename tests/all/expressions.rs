@@ -1,4 +1,4 @@
-//! Expressions, breakpoints and queries over HTTP, and the page that documents the language.
+//! Expressions, breakpoints and queries over HTTP, and the document of the language.
 
 use axum::body::Body;
 use axum::http::Method;
@@ -6,7 +6,7 @@ use serde_json::json;
 use sightline_recordings::create_simulated;
 use sightline_tests::server::{Answer, TestServer, request, small_drive, small_scenario};
 
-/// A server with a session whose target was tracked to the end, and what keeps its folders.
+/// A server with a session whose target was tracked to the end, and its folders.
 async fn tracked() -> (TestServer, String, [tempfile::TempDir; 2]) {
     let folders = [small_drive(), tempfile::tempdir().unwrap()];
     let server = TestServer::open(folders[0].path(), folders[1].path());
@@ -16,7 +16,7 @@ async fn tracked() -> (TestServer, String, [tempfile::TempDir; 2]) {
     (server, session, folders)
 }
 
-/// A server with a session on a drive that was never rendered: what needs no step needs no image.
+/// A server with a session on a drive that was never rendered, for requests that need no images.
 async fn begun() -> (TestServer, String, [tempfile::TempDir; 2]) {
     let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
     create_simulated(&small_scenario(), folders[0].path()).unwrap();
@@ -55,7 +55,7 @@ async fn a_query_answers_for_every_run_at_once_as_the_rows_do() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn breakpoints_are_set_changed_and_removed_and_survive_the_server() {
+async fn breakpoints_can_be_edited_and_survive_a_restart() {
     let (server, session, folders) = tracked().await;
     let path = format!("sessions/{session}/breakpoints");
     let mut events = server.state.events().subscribe();
@@ -66,8 +66,8 @@ async fn breakpoints_are_set_changed_and_removed_and_survive_the_server() {
         "{high}"
     );
     assert_eq!(high["hits"], json!([{ "target": 0, "run": 0, "steps": [1, 2, 3, 4] }]));
-    let told = serde_json::to_value(events.try_recv().unwrap()).unwrap();
-    assert_eq!(told["event"], json!("session_changed"), "other pages hear of it");
+    let event = serde_json::to_value(events.try_recv().unwrap()).unwrap();
+    assert_eq!(event["event"], json!("session_changed"), "other pages hear of it");
     let here = server.post(&path, &json!({ "step": 2 })).await.expect(201);
     assert_eq!((&here["expression"], &here["count"]), (&json!("step == 2"), &json!(1)));
     let off = server.json(Method::PATCH, &format!("{path}/0"), &json!({ "on": false })).await.expect(200);
@@ -88,7 +88,7 @@ async fn breakpoints_are_set_changed_and_removed_and_survive_the_server() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_run_that_goes_on_adds_hits() {
+async fn a_resumed_run_adds_hits() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     std::fs::remove_dir_all(drive.path().join("images")).unwrap();
     let server = TestServer::open(drive.path(), folder.path());
@@ -183,7 +183,7 @@ async fn the_language_and_completion_are_served() {
     server.post("expressions/complete", &json!({ "text": "a" })).await.problem(422, "field");
 }
 
-/// The rows of the tables and the examples of docs/expressions.md.
+/// The tables and examples of docs/expressions.md.
 struct Page {
     text: String,
 }
@@ -194,7 +194,7 @@ impl Page {
         Self { text: std::fs::read_to_string(path).unwrap() }
     }
 
-    /// The first cells of the table below a heading, without their code marks.
+    /// The cells of the table below a heading, without their backticks.
     fn column(&self, heading: &str) -> Vec<Vec<String>> {
         let below = self.text.split(&format!("## {heading}\n")).nth(1).unwrap_or_default();
         let section = below.split("\n## ").next().unwrap_or_default();
@@ -204,7 +204,7 @@ impl Page {
         rows.map(|row| row.trim_matches('|').split(" | ").map(cell).collect()).collect()
     }
 
-    /// The lines of the code blocks of a kind.
+    /// The lines of all code blocks of a kind.
     fn blocks(&self, kind: &str) -> Vec<String> {
         let begin = format!("```{kind}\n");
         let blocks = self.text.split(&begin).skip(1);
@@ -214,7 +214,7 @@ impl Page {
 }
 
 #[test]
-fn the_page_of_the_language_names_what_the_catalogue_has_and_nothing_else() {
+fn the_language_page_lists_exactly_the_catalogue() {
     use sightline_session::expression::{catalogue, functions, unit};
     let page = Page::read();
     let known: Vec<Vec<String>> = catalogue::short_names()
@@ -234,7 +234,7 @@ fn the_page_of_the_language_names_what_the_catalogue_has_and_nothing_else() {
 }
 
 #[test]
-fn every_example_of_the_page_is_read_and_every_bad_one_is_refused_as_it_says() {
+fn documented_expressions_parse_or_fail_as_documented() {
     use sightline_session::expression::Expression;
     let page = Page::read();
     let examples = page.blocks("expression");

@@ -1,4 +1,4 @@
-//! Runs take turns: a short one does not wait for long ones that began before it.
+//! Runs take turns: a short one does not wait for long ones that started before it.
 
 use axum::http::Method;
 use serde_json::json;
@@ -34,24 +34,24 @@ async fn short_run_ends_before_two_long_ones() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_run_that_waits_says_for_how_many() {
+async fn a_waiting_run_reports_its_queue_position() {
     let (drive, folder) = (long_recording(600), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), folder.path());
     let session = server.begin().await;
     server.pick(&session).await;
     server.pick(&session).await;
-    let mut told = Vec::new();
-    // Between two steps of another run there may be room for a moment.
-    while told.len() < 5 && !told.iter().any(|doing| doing == "waiting for 2 runs before it") {
+    let mut reports = Vec::new();
+    // A new run may start at once between two steps of another one.
+    while reports.len() < 5 && !reports.iter().any(|doing| doing == "waiting for 2 runs before it") {
         let mut events = server.state.events().subscribe();
         let next = server.pick(&session).await;
-        told.extend(std::iter::from_fn(|| events.try_recv().ok()).find_map(|event| match event {
+        reports.extend(std::iter::from_fn(|| events.try_recv().ok()).find_map(|event| match event {
             Event::RunProgress { target, doing, .. } if target as u64 == next => Some(doing),
             _ => None,
         }));
     }
-    let waits = told.iter().any(|doing| doing.starts_with("waiting for ") && doing.ends_with("before it"));
-    assert!(waits, "{told:?}");
+    let waits = reports.iter().any(|doing| doing.starts_with("waiting for ") && doing.ends_with("before it"));
+    assert!(waits, "{reports:?}");
     let removed = server.json(Method::DELETE, &format!("sessions/{session}"), &json!({})).await;
     assert_eq!(removed.status.as_u16(), 204, "the long runs end");
 }

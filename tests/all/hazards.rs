@@ -1,4 +1,4 @@
-//! The goodness map of a drive by REST: the map on which the navigator chose, and why there is none.
+//! The goodness map of a drive by REST: the map on which the navigator decided, and the reason if there is none.
 
 use serde_json::{Value, json};
 use sightline_recordings::{Traverse, create_simulated};
@@ -9,8 +9,8 @@ use sightline_world::choose_targets;
 
 use crate::driving::{begin, waited, waits_at};
 
-/// The failing cells of a decision with a step that is too high, x and y of the site frame, m. Unknown ground vetoes as well, without
-/// a rock.
+/// The cells that a decision rejects because of a step that is too high, x and y in the site frame, m. Unknown ground can be
+/// rejected without a rock.
 fn vetoes(cycle: &Value) -> Vec<[f64; 2]> {
     let at = |veto: &Value| [0, 1].map(|axis| veto["in_site_m"][axis].as_f64().unwrap());
     let all = cycle["choice"]["candidates"].as_array().into_iter().flatten();
@@ -18,7 +18,7 @@ fn vetoes(cycle: &Value) -> Vec<[f64; 2]> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_map_of_a_stop_has_the_rock_for_which_paths_were_vetoed() {
+async fn the_hazard_map_contains_the_rock_that_vetoed_paths() {
     let scenario = rock_on_the_way();
     let (drive, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let path = drive.path().join("drive");
@@ -73,14 +73,14 @@ async fn the_map_of_a_stop_has_the_rock_for_which_paths_were_vetoed() {
     }
     let corners = &rows("map_hazards/ground").numbers[&("Mesh3D:vertex_positions".to_owned(), step as i64)];
     let known = map["basis"].as_array().unwrap().iter().filter(|basis| **basis != "unknown").count();
-    // Cells that are assumed to be good have no height where nothing was measured.
+    // Cells that are assumed to be good have no height if nothing was measured there.
     assert!(corners.len() > 12 * known / 2 && corners.len() <= 12 * known, "{} {known}", corners.len());
     let later = server.get(&format!("sessions/{session}/drive/steps/99/hazards")).await;
     assert!(later.problem(404, "not_found").contains("has not come to step 99"));
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_drive_without_a_map_says_how_to_get_one() {
+async fn a_drive_without_a_map_explains_how_to_get_one() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), folder.path());
     let session = begin(&server, &json!({ "command": { "standoff_m": 3.0 }, "pause_at": 0 })).await;

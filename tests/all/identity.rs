@@ -1,4 +1,4 @@
-//! A recorded drive is its index and its images: other images are another drive, and sessions stay with theirs.
+//! A recorded drive is identified by its index and its images: with other images it is another drive; sessions keep theirs.
 
 use std::path::Path;
 
@@ -7,13 +7,13 @@ use sightline_recordings::Traverse;
 use sightline_server::state::AppState;
 use sightline_tests::server::{PORT, TestServer, access, small_drive, small_recording};
 
-/// The server of some drives with its sessions in `folder`.
+/// A server state with several drives, whose sessions are stored in `folder`.
 fn state(drives: &[&Path], folder: &Path) -> AppState {
     let drives = drives.iter().map(|drive| Traverse::open(drive).unwrap()).collect();
     AppState::new(drives, folder, access(PORT)).unwrap()
 }
 
-/// Exchanges the left images of two stops.
+/// Swaps the left images of two stops.
 fn exchange_images(drive: &Path) {
     let [first, second, aside] =
         ["left_0001.png", "left_0002.png", "aside.png"].map(|name| drive.join("images").join(name));
@@ -88,7 +88,7 @@ async fn a_session_named_by_the_index_alone_takes_the_new_name() {
         assert_eq!(view["traverse"], json!(name));
         assert_eq!(server.get("health").await.expect(200)["notices"], json!([]));
     }
-    // The second start would have found the old name otherwise.
+    // Unless the new name was stored, the session would be listed with the exchanged images.
     exchange_images(drive.path());
     let server = TestServer::open(drive.path(), folder.path());
     assert_eq!(server.get("sessions").await.expect(200), json!([]));
@@ -116,8 +116,8 @@ async fn the_reproducible_file_names_the_digest_of_the_images() {
     drop(server);
     exchange_images(drive.path());
     let server = TestServer::open(drive.path(), folder.path());
-    let brought = json!({ "traverse": { "id": file["traverse"]["id"], "name": file["traverse"]["name"] },
+    let reproduction = json!({ "traverse": { "id": file["traverse"]["id"], "name": file["traverse"]["name"] },
         "session": file["session"], "notes": file["notes"] });
-    let refused = server.post("sessions/reproduced", &brought).await.problem(422, "traverse");
+    let refused = server.post("sessions/reproduced", &reproduction).await.problem(422, "traverse");
     assert!(refused.contains("other images"), "{refused}");
 }

@@ -1,4 +1,4 @@
-//! Real recordings, imported and opened: what the files say is what the traverse says.
+//! Real recordings, imported and opened: the traverse has the values of the files.
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -70,7 +70,7 @@ fn the_navcam_pair_opens_as_one_convergent_stop() {
     assert_eq!(stop.site_from_rover.position_m, [73.9193, 65.9703, 6.56288]);
     assert_eq!(stop.site_from_rover.quaternion_sxyz, [0.580525, 0.0333603, -0.128929, 0.803278]);
     assert_eq!(traverse.index().full_scale_dn, Some(4095.0));
-    // The label counts the sun's elevation downwards: -41.7863.
+    // The label has the negative of the sun's elevation: -41.7863.
     let light = traverse.light(0, &AtomicBool::new(false)).unwrap().unwrap();
     assert_eq!([light.sun_azimuth_deg, light.sun_elevation_deg], [281.703, 41.7863]);
     assert_eq!(light.exposure_s, Some(0.41984));
@@ -92,13 +92,13 @@ fn the_navcam_pair_opens_as_one_convergent_stop() {
 }
 
 #[test]
-fn a_picture_of_the_hazcams_from_the_same_place_is_a_further_camera() {
+fn a_hazcam_image_from_the_same_stop_is_a_further_camera() {
     let Some(source) = data::set("mer1-navcam-sol4087-pair", "the hazcam of the import") else { return };
     let folder = tempfile::tempdir().unwrap();
     let (_, traverse) = imported(&source, folder.path());
     let cameras: Vec<_> = traverse.further_cameras(0).collect();
     assert_eq!(cameras.len(), 1);
-    // The other eye of that moment is not in the folder: a single camera.
+    // The other image of that moment is not in the folder: a single camera.
     assert_eq!((cameras[0].name.as_str(), cameras[0].right), ("front_hazcam_left", None));
     let product = Product::read(&source.join("1F490747543EFFCNY9P1214L0M1.IMG")).unwrap();
     let image = traverse.capture_one(0, Some(cameras[0].name), true).unwrap();
@@ -107,7 +107,7 @@ fn a_picture_of_the_hazcams_from_the_same_place_is_a_further_camera() {
     for (dn, fraction) in raster.samples.iter().zip(image.as_raw()) {
         assert!((f64::from(*fraction) * 4095.0 - f64::from(*dn)).abs() < 1e-3);
     }
-    // Carried from the rover frame of its own label into that of the stop.
+    // Transformed from the rover frame of its own label into that of the stop.
     let rover_from_site = traverse.site_from_rover(0).inverse();
     let expected =
         product.camera().unwrap().moved(&(rover_from_site * product.site_from_rover().unwrap().to_pose()));
@@ -130,20 +130,20 @@ fn matched_points_project_to_where_they_were_matched() {
             let [u1, v1, u2, v2, x, y, z] = [0, 1, 2, 3, 4, 5, 6].map(|k| row.numbers[k]);
             let point = Point3::new(x, y, z);
             let seen = traverse.left_camera(0).project(&point).zip(traverse.right_camera(0).project(&point));
-            // The rays of matches near the horizon diverge by noise: those "points" lie behind the cameras.
+            // Noise makes the rays of matches near the horizon diverge: those "points" are behind the cameras.
             let Some((left, right)) = seen else { continue };
             residuals_px.extend([left.distance(Pixel::new(u1, v1)), right.distance(Pixel::new(u2, v2))]);
         }
         assert!(residuals_px.len() as f64 > 2.0 * 0.85 * count as f64, "{set}: {}", residuals_px.len());
         residuals_px.sort_by(f64::total_cmp);
         let median_px = residuals_px[residuals_px.len() / 2];
-        // The medians of the sets' READMEs; the points are given to 1 mm, which is 0.1 px at 5 m.
+        // The medians from the READMEs of the sets; the points are rounded to 1 mm, which is 0.1 px at 5 m.
         assert!((median_px - expected_px).abs() < 0.03, "{set}: {median_px}");
     }
 }
 
 #[test]
-fn pixels_have_the_statistics_of_their_labels_and_survive_the_import() {
+fn imported_pixels_match_the_statistics_of_their_labels() {
     for (set, file, mean, smallest, largest) in [
         ("mer2-navcam-sol1869", "2n292280938effb100p0703l0m1.img", 1231.7844, 297.0, 4079.0),
         ("mer1-hazcam-edr", "1F483288473EFFCMUFP1214L0M1.IMG", 840.0535, 5.0, 4046.0),
@@ -172,7 +172,7 @@ fn pixels_have_the_statistics_of_their_labels_and_survive_the_import() {
 }
 
 #[test]
-fn a_folder_without_a_pair_says_what_it_lacks() {
+fn a_folder_without_a_pair_names_what_is_missing() {
     for set in ["mer2-navcam-linearized", "msl-navcam-hazcam", "mer1-hazcam-edr"] {
         let Some(source) = data::set(set, "the refusal of its import") else { continue };
         let folder = tempfile::tempdir().unwrap();

@@ -1,6 +1,6 @@
-//! All tests that cross crates.
+//! Tests across crates.
 
-// A test says what went wrong by panicking, in its helpers too.
+// Tests report failures by panicking, in their helpers too.
 #![allow(clippy::unwrap_used)]
 
 mod api;
@@ -10,19 +10,19 @@ mod bounds;
 mod cameras;
 mod cli;
 mod compare;
-mod copied;
+mod copied_commands;
 mod drill;
 mod driving;
 mod stage_pause;
 mod odometry;
-mod ending;
+mod shutdown;
 mod exports;
 mod expressions;
 mod fairness;
 mod hazards;
 mod identity;
 mod imports;
-mod keeping;
+mod persistence;
 mod opening;
 mod page_jobs;
 mod page_linked;
@@ -51,17 +51,17 @@ mod page_speed;
 mod page_travel;
 mod page_visits;
 mod page_trackers;
-mod page_trouble;
+mod page_faults;
 mod page_undo;
 mod recorded_cameras;
 mod recorded_tracking;
 mod records;
 mod recordings;
 mod removal;
-mod repeated;
+mod idempotency;
 mod rerun_export;
 mod studies;
-mod surviving;
+mod after_kill;
 mod trackability;
 mod uploads;
 mod visits;

@@ -1,4 +1,4 @@
-//! Visual odometry of a stop by REST: the stored motion with its corners, and the reason where there is none.
+//! Visual odometry of a stop by REST: the stored motion with its corners, or the reason if there is none.
 
 use serde_json::{Value, json};
 use sightline_tests::server::{TestServer, small_drive};
@@ -12,7 +12,7 @@ fn with(odometry: &str) -> Value {
     command
 }
 
-/// How many corners have one of these fates.
+/// The number of corners with one of these fates.
 fn count(corners: &[Value], fates: &[&str]) -> usize {
     corners.iter().filter(|corner| fates.contains(&corner["fate"].as_str().unwrap())).count()
 }
@@ -45,7 +45,7 @@ async fn the_odometry_of_a_stop_has_the_stored_motion_and_its_corners() {
     }
     assert_eq!(server.get(&path(1)).await.expect(200), found, "the same from memory");
 
-    // Where there is none, one sentence says why.
+    // Without odometry, one sentence states the reason.
     let refused = |step, status, code| {
         let (server, path) = (&server, path(step));
         async move { server.get(&path).await.problem(status, code) }
@@ -58,7 +58,7 @@ async fn the_odometry_of_a_stop_has_the_stored_motion_and_its_corners() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_drive_without_odometry_says_so_for_its_stops() {
+async fn a_drive_without_odometry_is_reported_as_such() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), folder.path());
     let session = begin(&server, &json!({ "command": with("off") })).await;

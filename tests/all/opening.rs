@@ -1,5 +1,5 @@
-//! What a page may bring to the server: a drive by its scenario and a session by its `reproduce.json`; the list of sessions
-//! says when each was used; and every problem names its request.
+//! Data that a page can send to the server: a scenario, which opens a drive, and `reproduce.json`, which opens a session.
+//! The list of sessions has the time of last use, and every problem has the id of its request.
 
 use axum::http::header;
 use serde_json::{Value, json};
@@ -7,21 +7,21 @@ use sightline_session::reproduce::Opened;
 use sightline_tests::server::{TestServer, small_drive, small_recording, small_scenario};
 use sightline_world::Scenario;
 
-/// Another drive than that of [`small_drive`].
+/// A drive other than [`small_drive`].
 fn other() -> Scenario {
     Scenario { name: "other drive".to_owned(), seed: 77, ..small_scenario() }
 }
 
-/// The code of a refusal, and what brings it about.
+/// The code of a refusal, and the change that causes it.
 type Change = (&'static str, fn(&mut Value));
 
-/// What the page sends of an exported file.
-fn brought(file: &Value) -> Value {
+/// The part of an exported file that the page sends.
+fn reproduction_of(file: &Value) -> Value {
     serde_json::to_value(Opened::read(file).expect("a file of our own").reproduction).unwrap()
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_scenario_becomes_a_drive_once_and_is_open_again_after_a_restart_with_its_sessions() {
+async fn a_scenario_drive_is_reopened_with_its_sessions() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let first = TestServer::open(drive.path(), folder.path());
     let new = json!({ "scenario": other().to_toml() });
@@ -61,7 +61,7 @@ async fn a_bad_scenario_is_refused_in_one_sentence_and_opens_nothing() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn an_exported_session_begins_again_elsewhere_with_the_same_rows_notes_and_breakpoints() {
+async fn an_exported_session_is_reproduced_on_another_server() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), folder.path());
     let session = server.begin().await;
@@ -78,10 +78,10 @@ async fn an_exported_session_begins_again_elsewhere_with_the_same_rows_notes_and
     server.json(axum::http::Method::PUT, &format!("sessions/{session}/cursor"), &cursor).await.expect(200);
     let file = server.get(&format!("sessions/{session}/exports/reproduce.json")).await.expect(200);
 
-    // Elsewhere: a server that has another drive, and no sessions.
+    // Another server, with another drive and without sessions.
     let (recording, elsewhere) = (small_recording(), tempfile::tempdir().unwrap());
     let other = TestServer::open(recording.path(), elsewhere.path());
-    let view = other.post("sessions/reproduced", &brought(&file)).await.expect(201);
+    let view = other.post("sessions/reproduced", &reproduction_of(&file)).await.expect(201);
     let id = view["id"].as_str().unwrap();
     assert_eq!(
         (&view["traverse"], &view["cursor"]),
@@ -124,7 +124,7 @@ async fn a_session_with_500_long_notes_can_be_brought_back() {
     server.post(&format!("sessions/{session}/notes"), &json!({ "step": 1, "text": "x" })).await.expect(201);
     let mut file = server.get(&format!("sessions/{session}/exports/reproduce.json")).await.expect(200);
     let note = file["notes"][0].clone();
-    // Signs of four bytes each.
+    // Characters of four bytes each.
     let text = "𝛼".repeat(4000);
     let notes = (1..=500).map(|id| {
         let mut note = note.clone();
@@ -135,20 +135,20 @@ async fn a_session_with_500_long_notes_can_be_brought_back() {
     let size = file.to_string().len();
     assert!(size > 7 << 20 && size < sightline_api::program::FILE_BYTES, "{size} bytes");
     let view = server.post("sessions/reproduced", &file).await.expect(201);
-    let brought = format!("sessions/{}/notes", view["id"].as_str().unwrap());
-    let notes = server.get(&brought).await.expect(200);
+    let notes_path = format!("sessions/{}/notes", view["id"].as_str().unwrap());
+    let notes = server.get(&notes_path).await.expect(200);
     assert_eq!((notes.as_array().unwrap().len(), &notes[499]["text"]), (500, &json!(text)));
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_session_that_names_what_cannot_be_is_refused_and_none_is_begun() {
+async fn an_invalid_session_file_is_rejected_without_a_session() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), folder.path());
     let session = server.begin().await;
     server.pick(&session).await;
     server.ended(&session, 0, 0).await;
     let path = format!("sessions/{session}/exports/reproduce.json");
-    let good = brought(&server.get(&path).await.expect(200));
+    let good = reproduction_of(&server.get(&path).await.expect(200));
     let changes: [Change; 7] = [
         ("traverse", |v| {
             v["traverse"] = json!({ "id": "mars-1", "name": "Mars", "scenario_toml": null });
@@ -172,7 +172,7 @@ async fn a_session_that_names_what_cannot_be_is_refused_and_none_is_begun() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_list_of_sessions_says_how_far_each_is_and_when_it_was_used_also_after_a_restart() {
+async fn session_progress_and_last_use_survive_a_restart() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), folder.path());
     let session = server.begin().await;
@@ -198,7 +198,7 @@ async fn the_list_of_sessions_says_how_far_each_is_and_when_it_was_used_also_aft
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_problem_names_its_request_and_its_time_and_so_does_the_header() {
+async fn problem_and_header_contain_request_id_and_time() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), folder.path());
     let first = server.get("sessions/s99").await;

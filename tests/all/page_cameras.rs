@@ -1,7 +1,7 @@
-//! Several cameras a stop in a real browser: another camera is chosen, a target is picked in it, and its marks stay there.
+//! Several cameras per stop in a real browser: another camera is chosen, a target is picked in it, and its marks stay there.
 
 use sightline_geometry::frames::Pixel;
-use sightline_tests::bench::{picked, place};
+use sightline_tests::browser_fixture::{canvas_position, picked};
 use sightline_tests::scenario::short_approach;
 use sightline_world::scenario::{CameraRig, FurtherRig};
 use sightline_world::traverse::CameraSource;
@@ -29,38 +29,42 @@ fn pixel_in_pancam(scenario: &Scenario) -> Pixel {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_camera_is_chosen_a_target_is_picked_in_it_and_its_marks_stay_there() {
+async fn a_target_is_picked_and_marked_in_the_chosen_camera() {
     let scenario = scenario();
-    let (bench, browser) = picked(&scenario).await;
-    browser.shot("cameras-main").await;
+    let (fixture, browser) = picked(&scenario).await;
+    browser.save_screenshot("cameras-main").await;
     browser.click_on("combobox", "Camera").await;
     browser.choose("pancam").await;
-    browser.wait_status("the pancam's image", "s.shown && s.complete && s.left_image_size !== null").await;
-    browser.says("is tracked in main pair").await;
+    browser
+        .wait_for_status("the pancam's image", "s.shown && s.complete && s.left_image_size !== null")
+        .await;
+    browser.wait_for_text("is tracked in main pair").await;
     assert!(browser.fragment().await.contains("cam=pancam"), "{}", browser.fragment().await);
-    browser.shot("cameras-pancam").await;
+    browser.save_screenshot("cameras-pancam").await;
 
     browser.go_to("0", 0).await;
-    browser.wait_status("the first image", "s.shown && s.complete && s.step === 0").await;
+    browser.wait_for_status("the first image", "s.shown && s.complete && s.step === 0").await;
     browser.press("t").await;
-    browser.wait_status("pick mode", "s.pick_mode").await;
-    browser.shot("cameras-pick").await;
-    let (x, y) = place(&browser, pixel_in_pancam(&scenario)).await;
+    browser.wait_for_status("pick mode", "s.pick_mode").await;
+    browser.save_screenshot("cameras-pick").await;
+    let (x, y) = canvas_position(&browser, pixel_in_pancam(&scenario)).await;
     browser.click(x, y).await;
-    browser.wait_status("the second target", "s.target === 1").await;
-    let count = bench.stop_count;
-    browser.wait_status("its run", &format!("s.steps_done === {count} && !s.running && s.complete")).await;
+    browser.wait_for_status("the second target", "s.target === 1").await;
+    let count = fixture.stop_count;
+    browser
+        .wait_for_status("its run", &format!("s.steps_done === {count} && !s.running && s.complete"))
+        .await;
     let fragment = browser.fragment().await;
     assert!(!fragment.contains("cam="), "the images follow the target: {fragment}");
-    // Nearer, the target leaves the narrow picture of the pancams.
+    // At a shorter range, the target leaves the narrow field of view of the pancams.
     browser.go_to("1", 1).await;
-    browser.wait_status("a step of it", "s.shown && s.complete && s.state === 'tracking'").await;
-    browser.shot("cameras-tracked-in-pancam").await;
+    browser.wait_for_status("a step of it", "s.shown && s.complete && s.state === 'tracking'").await;
+    browser.save_screenshot("cameras-tracked-in-pancam").await;
 
     browser.click_on("combobox", "Camera").await;
     browser.choose("front_hazcam").await;
-    browser.wait_status("the hazcam's image", "s.shown && s.complete").await;
-    browser.says("is tracked in pancam").await;
-    browser.shot("cameras-hazcam").await;
+    browser.wait_for_status("the hazcam's image", "s.shown && s.complete").await;
+    browser.wait_for_text("is tracked in pancam").await;
+    browser.save_screenshot("cameras-hazcam").await;
     browser.end().await;
 }

@@ -1,21 +1,21 @@
-//! Exports in a real browser: every file of the window as it is downloaded, every action as a command that is really run, and
-//! the live stream in Rerun's own viewer.
+//! Exports in a real browser: every file of the window is downloaded, every action is copied as a command that is run, and
+//! Rerun's own viewer shows the live stream.
 
 use std::process::Command;
 use std::time::Duration;
 
 use serde_json::Value;
-use sightline_tests::bench::{Bench, picked};
 use sightline_tests::browser::Browser;
+use sightline_tests::browser_fixture::{BrowserFixture, picked};
 use sightline_tests::scenario::short_approach;
 use sightline_tests::server::TOKEN;
 
-/// Keeps what the page opens and copies, in place of doing it.
+/// Records URLs that the page opens and texts that it copies, instead of doing so.
 const CATCH: &str = "window.opened = []; window.open = url => { window.opened.push(url); return null; }; \
     window.copied = []; Object.defineProperty(navigator, 'clipboard', { value: { \
         writeText: text => { window.copied.push(text); return Promise.resolve(); } } });";
 
-/// The next thing that the page opens (`opened`) or copies (`copied`) once a button is activated.
+/// Activates a button and returns the next URL that the page opens (`opened`) or text that it copies (`copied`).
 async fn caught(browser: &Browser, kept: &str, button: &str) -> String {
     let before = browser.evaluate(&format!("return window.{kept}.length")).await;
     browser.activate("button", button).await;
@@ -24,7 +24,7 @@ async fn caught(browser: &Browser, kept: &str, button: &str) -> String {
     text.as_str().unwrap().to_owned()
 }
 
-/// How the bytes of a kind of file begin, or what is in them.
+/// Checks the signature or the contents of a kind of file.
 fn is_what_it_says(name: &str, bytes: &[u8]) -> bool {
     let text = || String::from_utf8_lossy(bytes);
     let has = |what: &[u8]| bytes.windows(what.len()).any(|part| part == what);
@@ -49,24 +49,24 @@ fn run(folder: &std::path::Path, text: &str) -> std::process::Output {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn every_file_is_downloaded_and_every_action_copied_as_a_command_that_works() {
-    let (bench, browser) = picked(&short_approach()).await;
+async fn downloads_and_copied_commands_work() {
+    let (fixture, browser) = picked(&short_approach()).await;
     browser.evaluate(CATCH).await;
     browser.go_to("2", 2).await;
     browser.chord(&["Control"], "s").await;
     browser.control("button", "download: ").await;
-    browser.shot("exports").await;
+    browser.save_screenshot("exports").await;
     let names: Vec<String> = browser.controls().await.into_iter().map(|control| control.name).collect();
     let titles: Vec<&str> = names.iter().filter_map(|name| name.strip_prefix("download: ")).collect();
     assert_eq!(titles.len(), 8, "{titles:?}");
     let folder = tempfile::tempdir().unwrap();
     for title in titles {
         let url = caught(&browser, "opened", &format!("download: {title}")).await;
-        let path = url.strip_prefix(bench.url().trim_end_matches('/')).expect("a file of this server");
+        let path = url.strip_prefix(fixture.url().trim_end_matches('/')).expect("a file of this server");
         let name = path.split('?').next().unwrap().rsplit('/').next().unwrap().to_owned();
-        let bytes = bench.get(path);
+        let bytes = fixture.get(path);
         assert!(is_what_it_says(&name, &bytes), "{title}: {name}, {} bytes", bytes.len());
-        // The same by the copied command, which writes the same file.
+        // The copied command writes the same file.
         let text = caught(&browser, "copied", &format!("copy as HTTP: {title}")).await;
         let (at, command) = (folder.path().to_owned(), text.clone());
         let done = tokio::task::spawn_blocking(move || run(&at, &command)).await.unwrap();
@@ -78,14 +78,14 @@ async fn every_file_is_downloaded_and_every_action_copied_as_a_command_that_work
     }
     let page = caught(&browser, "opened", "Open this step as a plain page").await;
     assert!(page.ends_with("/sessions/s1/targets/0/runs/0/steps/2/page"), "{page}");
-    check_actions(&browser, &bench, folder.path()).await;
+    check_actions(&browser, &fixture, folder.path()).await;
     browser.press("Escape").await;
-    browser.gone("button", "download: ").await;
+    browser.wait_until_gone("button", "download: ").await;
     browser.end().await;
 }
 
-/// What was done on the page is done again by the commands that it gives.
-async fn check_actions(browser: &Browser, bench: &Bench, folder: &std::path::Path) {
+/// Repeats the actions of the page with the commands that it gives.
+async fn check_actions(browser: &Browser, fixture: &BrowserFixture, folder: &std::path::Path) {
     let text = caught(browser, "copied", "copy as HTTP: read step 2").await;
     let at = folder.to_owned();
     let done = tokio::task::spawn_blocking(move || run(&at, &text)).await.unwrap();
@@ -95,34 +95,34 @@ async fn check_actions(browser: &Browser, bench: &Bench, folder: &std::path::Pat
     let at = folder.to_owned();
     let done = tokio::task::spawn_blocking(move || run(&at, &text)).await.unwrap();
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
-    let targets = bench.json("/api/v1/sessions/s1")["targets"].as_array().unwrap().clone();
+    let targets = fixture.json("/api/v1/sessions/s1")["targets"].as_array().unwrap().clone();
     assert_eq!(targets.len(), 2, "the same pick again");
     let pixel = |k: usize| {
         (targets[k]["designation"]["pixel"]["x"].clone(), targets[k]["designation"]["pixel"]["y"].clone())
     };
     assert_eq!(pixel(0), pixel(1));
-    // As a command of the program: `tests/all/cli.rs` runs what it does; here it names drive, pixel and settings.
+    // As a command of the program, which `tests/all/cli.rs` runs; here the test checks drive, pixel and settings.
     let text = caught(browser, "copied", "copy as command: pick ").await;
     assert!(text.starts_with("sightline track ") && text.contains(" --target "), "{text}");
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn the_live_stream_is_shown_by_reruns_own_viewer() {
-    let (bench, browser) = picked(&short_approach()).await;
+    let (fixture, browser) = picked(&short_approach()).await;
     browser.evaluate(CATCH).await;
     let url = caught(&browser, "opened", "Open in Rerun").await;
-    assert!(url.starts_with(&format!("{}api/v1/rerun/index.html?session=s1", bench.url())), "{url}");
-    // The page says how another viewer reads it.
+    assert!(url.starts_with(&format!("{}api/v1/rerun/index.html?session=s1", fixture.url())), "{url}");
+    // The page states how another viewer reads the stream.
     browser.show_panel("Messages").await;
-    browser.says("| rerun -").await;
-    browser.shot("rerun-message").await;
+    browser.wait_for_text("| rerun -").await;
+    browser.save_screenshot("rerun-message").await;
 
-    // In the same browser, which has the cookie.
+    // The same browser, because it has the cookie.
     let viewer = browser;
     viewer.goto(&url).await;
     let painted = "const c = document.querySelector('canvas'); return c !== null && c.width > 300";
     viewer.wait_for("rerun's canvas", painted).await;
-    // What it shows changes until all of the session is there; a page that paints nothing stays one grey.
+    // The image changes until the whole session is loaded; a page that paints nothing remains a uniform grey.
     let start = std::time::Instant::now();
     loop {
         let page = image::load_from_memory(&viewer.screenshot().await).unwrap().to_rgb8();
@@ -134,8 +134,8 @@ async fn the_live_stream_is_shown_by_reruns_own_viewer() {
         tokio::time::sleep(Duration::from_secs(1)).await;
     }
     tokio::time::sleep(Duration::from_secs(3)).await;
-    viewer.shot("rerun").await;
-    // That viewer wants to report its use to its makers: the page's policy forbids it, which the console tells, and no more.
+    viewer.save_screenshot("rerun").await;
+    // That viewer tries to send usage statistics; the page's policy blocks it, which is the only error in the console.
     let errors = viewer.console_errors().await;
     let is_refused = |error: &String| {
         error.contains("Content Security Policy") || error.contains("TypeError: Failed to fetch")

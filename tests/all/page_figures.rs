@@ -1,17 +1,17 @@
-//! Figures and tables in a real browser: a panel saved as SVG and as PNG by its menu, the two drawn by the browser and
-//! compared; a plot as a table, by role and name. The test ends by asking the console for errors.
+//! Figures and tables in a real browser: a panel is saved as SVG and as PNG by its menu, the browser draws both, and they
+//! are compared; a plot is read as a table, by role and name. The test ends by checking the console for errors.
 
 use std::time::Duration;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::Value;
-use sightline_tests::bench::picked;
 use sightline_tests::browser::Browser;
+use sightline_tests::browser_fixture::picked;
 use sightline_tests::scenario::short_approach;
 
-/// Keeps what the page gives to be saved, in place of saving it. The page may not fetch what it made, so that the file is
-/// read where it is made.
+/// Records files that the page offers for saving, instead of saving them. The page may not fetch its own blobs, so they are
+/// read where they are created.
 const CATCH: &str = "window.saved = []; const make = URL.createObjectURL; \
     URL.createObjectURL = blob => { window.blob = blob; return make.call(URL, blob); }; \
     HTMLAnchorElement.prototype.click = function () { \
@@ -42,7 +42,7 @@ async fn save(browser: &Browser, panel: &str, kind: &str) -> (String, Vec<u8>) {
     (name, STANDARD.decode(url.split_once("base64,").unwrap().1).unwrap())
 }
 
-/// The mean difference of two pictures, of 255, and the share of pixels that differ by more than 48.
+/// The mean difference of two images, of 255, and the share of pixels that differ by more than 48.
 fn difference(a: &[u8], b: &[u8]) -> (f64, f64) {
     assert_eq!(a.len(), b.len());
     let off: Vec<u8> = a.iter().zip(b).map(|(a, b)| a.abs_diff(*b)).collect();
@@ -52,22 +52,22 @@ fn difference(a: &[u8], b: &[u8]) -> (f64, f64) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_panel_is_saved_as_svg_and_png_which_look_alike_and_a_plot_is_read_as_a_table() {
+async fn panels_export_as_equal_svg_and_png_and_plots_as_tables() {
     let (_bench, browser) = picked(&short_approach()).await;
     browser.evaluate(CATCH).await;
     browser.press("ArrowRight").await;
-    browser.wait_status("a step with scores", "s.step === 1 && s.shown").await;
+    browser.wait_for_status("a step with scores", "s.step === 1 && s.shown").await;
     browser.show_panel("Match scores").await;
     tokio::time::sleep(Duration::from_millis(1500)).await;
 
-    // For a paper: white, and as wide as chosen; then as on the screen.
+    // For a paper: a white background and the chosen width; then as on the screen.
     let (_, png) = save(&browser, "Match scores", "PNG 2x").await;
     let paper = image::load_from_memory(&png).unwrap().to_rgb8();
     assert_eq!((paper.width(), paper.get_pixel(1, 1).0), (2 * 720, [255; 3]));
     browser.click_on("button", "Match scores menu").await;
     browser.click_on("button", "as on the screen").await;
     browser.press("Escape").await;
-    browser.gone("button", "as on the screen").await;
+    browser.wait_until_gone("button", "as on the screen").await;
 
     let (name, png) = save(&browser, "Match scores", "PNG 2x").await;
     assert!(name.starts_with("sightline-") && name.ends_with("-match-scores-2x.png"), "{name}");
@@ -82,7 +82,7 @@ async fn a_panel_is_saved_as_svg_and_png_which_look_alike_and_a_plot_is_read_as_
         "{}",
         &text[..400]
     );
-    // What is on the screen is the same again, at half the scale.
+    // The panel on the screen is the same, at half the scale.
     let place = browser.control("region", "Match scores").await.rect;
     let screen = image::load_from_memory(&browser.screenshot().await).unwrap().to_rgb8();
     let [x, y, w, h] = place.map(|v| v.round() as u32);
@@ -99,13 +99,13 @@ async fn a_panel_is_saved_as_svg_and_png_which_look_alike_and_a_plot_is_read_as_
     browser.control("columnheader", "scores match score").await;
     browser.control("row", "step 0").await;
     browser.click_on("button", "go to step 2").await;
-    browser.wait_status("the step", "s.step === 2 && s.shown").await;
-    browser.control("row", "step 2, the present one").await;
-    browser.shot("table").await;
+    browser.wait_for_status("the step", "s.step === 2 && s.shown").await;
+    browser.control("row", "step 2, the current one").await;
+    browser.save_screenshot("table").await;
     browser.click_on("button", "Over the steps as table").await;
-    browser.gone("table", "Over the steps, ").await;
+    browser.wait_until_gone("table", "Over the steps, ").await;
 
-    // The metric by which the runs are sorted is kept in the address.
+    // The metric by which the runs are sorted is part of the address.
     browser.chord(&["Control"], "k").await;
     browser.type_text("show runs").await;
     browser.press("Enter").await;
@@ -117,7 +117,7 @@ async fn a_panel_is_saved_as_svg_and_png_which_look_alike_and_a_plot_is_read_as_
     browser.wait_for("the sorting in the address", "return location.hash.includes('sort=ade_px')").await;
     assert_eq!(browser.console_errors().await, Vec::<String>::new());
 
-    // The browser draws the SVG by itself: another hand than the one that drew the PNG.
+    // The browser renders the SVG, independently of the code that rendered the PNG.
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("figure.svg");
     std::fs::write(&file, &text).unwrap();
@@ -133,7 +133,7 @@ async fn a_panel_is_saved_as_svg_and_png_which_look_alike_and_a_plot_is_read_as_
     }
     let (mean, far) = difference(drawn.as_raw(), once.as_raw());
     println!("SVG against PNG: mean {mean:.2} of 255, {:.1} % far", far * 100.0);
-    // Letters come from another font where the browser has not the page's.
+    // Without the page's font, the browser draws letters in another one.
     assert!(mean < 6.0 && far < 0.08, "mean {mean:.2} of 255, {:.1} % of the pixels far off", far * 100.0);
     browser.close().await;
 }

@@ -1,11 +1,11 @@
-//! How much of the page the left image has, in windows of many sizes, on the drive with which a new user begins.
+//! Share of the page that the left image covers, in windows of many sizes, on the drive of a new user.
 
 use std::time::Duration;
 
-use sightline_tests::bench::first_page;
 use sightline_tests::browser::Browser;
+use sightline_tests::browser_fixture::first_page;
 
-/// Width and height of a window, px, and the least share of the page that the left image covers in *Overview* and in *Image*.
+/// Width and height of a window, px, and the minimum share of the left image in *Overview* and in *Image*.
 const WINDOWS: [(u32, u32, [f64; 2]); 6] = [
     (820, 1180, [0.1, 0.1]),
     (1280, 720, [0.1, 0.2]),
@@ -16,7 +16,7 @@ const WINDOWS: [(u32, u32, [f64; 2]); 6] = [
     (960, 600, [0.07, 0.15]),
 ];
 
-/// Area of the image on the screen as a part of the page's.
+/// Area of the image on the screen as a fraction of the page's area.
 const SHARE: &str = "return (() => { const s = JSON.parse(document.querySelector('canvas').dataset.status); \
      if (!s.image_to_screen) return null; const [w, h] = s.left_image_size; const [, , pw, ph] = s.left_image_rect; \
      const k = s.image_to_screen.scale; return Math.min(w * k, pw) * Math.min(h * k, ph) / (innerWidth * innerHeight) })()";
@@ -44,10 +44,10 @@ async fn the_left_image_has_most_of_the_page() {
         browser.resize(width, height).await;
         for (digit, name, least) in [("1", "overview", least[0]), ("8", "image", least[1])] {
             browser.chord(&["Shift"], digit).await;
-            browser.wait_status("the image", "s.shown && s.complete && s.image_to_screen !== null").await;
+            browser.wait_for_status("the image", "s.shown && s.complete && s.image_to_screen !== null").await;
             let share = share_of_the_image(&browser, least).await;
             println!("{width} × {height}, {name}: {:.1} %", 100.0 * share);
-            browser.shot(&format!("image-{width}-{name}")).await;
+            browser.save_screenshot(&format!("image-{width}-{name}")).await;
             if share < least {
                 too_small.push((width, height, name, share));
             }

@@ -1,24 +1,24 @@
-//! A picture of every panel at a fixed step of a fixed drive, held against the one that was looked at and kept.
+//! Snapshot tests of every panel at a fixed step of a fixed drive.
 //!
-//! `SIGHTLINE_SNAPSHOTS=write` writes the pictures anew: look at every one before it is committed. Without it, a panel that
-//! looks different fails, and its picture of now is left in the system's temporary folder.
+//! `SIGHTLINE_SNAPSHOTS=write` writes the snapshots: inspect every one before it is committed. Otherwise a panel that
+//! differs fails the test, and its actual image is left in the system's temporary folder.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use image::RgbImage;
-use sightline_tests::bench::Bench;
 use sightline_tests::browser::Browser;
+use sightline_tests::browser_fixture::BrowserFixture;
 use sightline_tests::scenario::short_approach;
 
-/// The step at which every panel is pictured.
+/// The step of the snapshots.
 const STEP: usize = 3;
 
-/// How much of a picture may differ, in thousandths of its pixels: another version of the browser smooths edges of
-/// letters in another way, and nothing more.
+/// Share of the pixels of a snapshot that may differ, per mille: another version of the browser smooths the edges of
+/// letters differently.
 const DIFFERENT_MAX: f64 = 4.0;
 
-/// How far the grey value of one channel may lie apart before a pixel counts as different.
+/// Largest difference of a channel, of 255, at which a pixel counts as equal.
 const NEAR: u8 = 24;
 
 /// Panels whose contents depend on the machine or the clock.
@@ -28,13 +28,13 @@ fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("snapshots")
 }
 
-/// The name of a panel's picture.
+/// The file name of a panel's snapshot.
 fn file_name(panel: &str) -> String {
     let plain = panel.to_lowercase().replace(|c: char| !c.is_ascii_alphanumeric(), " ");
     format!("{}.png", plain.split_whitespace().collect::<Vec<_>>().join("-"))
 }
 
-/// The panel that fills the page, once it has stopped changing.
+/// A screenshot of the maximised panel, once it has stopped changing.
 async fn picture(browser: &Browser, panel: &str) -> RgbImage {
     let [x, y, width, height] = browser.control("region", panel).await.rect.map(|v| v.max(0.0) as u32);
     let mut before: Option<RgbImage> = None;
@@ -51,7 +51,7 @@ async fn picture(browser: &Browser, panel: &str) -> RgbImage {
     panic!("{panel} does not come to rest");
 }
 
-/// How many thousandths of the pixels differ; all of them where the sizes do.
+/// Share of the pixels that differ, per mille; all of them if the sizes differ.
 fn difference(a: &RgbImage, b: &RgbImage) -> f64 {
     if a.dimensions() != b.dimensions() {
         return 1000.0;
@@ -62,24 +62,24 @@ fn difference(a: &RgbImage, b: &RgbImage) -> f64 {
     far as f64 * 1000.0 / f64::from(a.width() * a.height()).max(1.0)
 }
 
-/// Brings one panel to the front and lets it fill the page.
+/// Brings one panel to the front and maximises it.
 async fn fill_page(browser: &Browser, panel: &str) {
     browser.show_panel(panel).await;
     browser.press("`").await;
     browser.control("button", "Restore").await;
-    // The pointer rests where it changes nothing.
+    // The pointer rests where it has no effect.
     browser.point_at(3.0, 3.0).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn every_panel_looks_as_it_was_last_seen() {
-    let bench = Bench::start(&short_approach()).await;
+async fn every_panel_matches_its_snapshot() {
+    let fixture = BrowserFixture::start(&short_approach()).await;
     let browser = Browser::start().await;
     browser.resize(1100, 621).await;
-    bench.pick(&browser).await;
+    fixture.pick(&browser).await;
     for step in 1..=STEP {
         browser.press("ArrowRight").await;
-        browser.wait_status("the next step", &format!("s.step === {step} && s.shown")).await;
+        browser.wait_for_status("the next step", &format!("s.step === {step} && s.shown")).await;
     }
     let writes = std::env::var("SIGHTLINE_SNAPSHOTS").is_ok_and(|word| word == "write");
     let all = browser.controls().await;
@@ -89,31 +89,31 @@ async fn every_panel_looks_as_it_was_last_seen() {
     for panel in panels.iter().filter(|panel| !LEFT_OUT.contains(&panel.as_str())) {
         fill_page(&browser, panel).await;
         let now = picture(&browser, panel).await;
-        let kept = folder().join(file_name(panel));
+        let snapshot = folder().join(file_name(panel));
         if writes {
             std::fs::create_dir_all(folder()).expect("the folder of pictures");
-            now.save(&kept).expect("a picture");
+            now.save(&snapshot).expect("a picture");
         }
-        let known = image::open(&kept).map(|known| known.to_rgb8()).unwrap_or_default();
+        let known = image::open(&snapshot).map(|known| known.to_rgb8()).unwrap_or_default();
         let difference = difference(&now, &known);
         if difference > DIFFERENT_MAX {
             let left = std::env::temp_dir().join(format!("sightline-{}", file_name(panel)));
             now.save(&left).expect("a picture");
             wrong.push(format!(
                 "{panel}: {difference:.1} ‰ differ from {}, see {}",
-                kept.display(),
+                snapshot.display(),
                 left.display()
             ));
         }
         browser.press("`").await;
-        browser.gone("button", "Restore").await;
+        browser.wait_until_gone("button", "Restore").await;
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     browser.end().await;
 }
 
 #[test]
-fn a_picture_that_differs_in_a_mark_is_told_apart_from_one_that_is_smoothed() {
+fn a_changed_mark_is_distinguished_from_antialiasing() {
     let plain = RgbImage::from_pixel(200, 100, image::Rgb([24, 27, 32]));
     let mut smoothed = plain.clone();
     smoothed.pixels_mut().step_by(7).for_each(|pixel| pixel.0[1] += 9);

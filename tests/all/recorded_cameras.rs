@@ -1,7 +1,7 @@
-//! Camera models from real labels against projections that an independent implementation made.
+//! Camera models from real labels, compared with projections of an independent implementation.
 //!
-//! The expected pixels are given to 1e-4 px for points given to 1e-4 m, so 0.001 px leaves room for the
-//! rounding and for O made unit (2e-4 px), and for nothing else.
+//! The expected pixels are rounded to 1e-4 px, for points rounded to 1e-4 m. The tolerance of 0.001 px covers this rounding
+//! and the normalisation of O (2e-4 px), and nothing else.
 
 use sightline_geometry::camera::{Cahv, Cahvor, Cahvore, CameraModel, Imaging};
 use sightline_geometry::frames::{Pixel, Point3, Vector3};
@@ -15,7 +15,7 @@ fn point(numbers: &[f64]) -> Point3 {
 }
 
 #[test]
-fn every_recorded_label_projects_as_the_independent_implementation_does() {
+fn recorded_labels_project_like_the_reference() {
     let sets = [
         "mer1-hazcam-edr",
         "mer1-navcam-sol4087-pair",
@@ -44,7 +44,7 @@ fn every_recorded_label_projects_as_the_independent_implementation_does() {
 }
 
 #[test]
-fn the_detached_label_of_a_product_says_the_same_as_its_attached_one() {
+fn detached_and_attached_labels_agree() {
     let Some(folder) = data::set("msl-navcam-hazcam", "the comparison of its two labels") else { return };
     let [attached, detached] = ["IMG", "LBL"].map(|ending| {
         Product::read(&folder.join(format!("NRB_701384494RAD_F0933408NCAM00200M1.{ending}"))).unwrap()
@@ -69,7 +69,7 @@ fn labels_of_other_writers_are_understood() {
 }
 
 #[test]
-fn the_real_stereo_pair_projects_as_the_independent_implementation_does() {
+fn the_real_stereo_pair_projects_like_the_reference() {
     let Some(folder) = data::set("mer2-navcam-stereo-labels", "the comparison of its cameras") else {
         return;
     };
@@ -87,7 +87,7 @@ fn the_real_stereo_pair_projects_as_the_independent_implementation_does() {
     }
 }
 
-/// The model of one case of the reference: its vectors as printed, L as T and P.
+/// The model of one case of the reference: its vectors as printed, linearity (L) as T and P.
 fn reference_model(case: &serde_json::Value) -> CameraModel {
     let numbers =
         |key: &str| -> [f64; 3] { std::array::from_fn(|k| case[key][k].as_f64().expect("a number")) };
@@ -115,7 +115,7 @@ fn the_published_reference_projections_are_reproduced() {
     let reference: serde_json::Value = serde_json::from_str(&text).unwrap();
     let pair = |value: &serde_json::Value| Pixel::new(value[0].as_f64().unwrap(), value[1].as_f64().unwrap());
     for case in reference["cases"].as_array().unwrap() {
-        // Their own iteration stops at 1e-6 px for CAHVORE and their numbers have 8 digits after the point.
+        // The reference iteration stops at 1e-6 px for CAHVORE; its numbers have 8 decimal places.
         let tolerance_px = if case["model"] == "CAHVORE" { 1e-6 } else { 1e-8 };
         let model = reference_model(case);
         let pixels = case["pixels"].as_array().unwrap();

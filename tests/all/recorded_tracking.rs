@@ -1,4 +1,4 @@
-//! The tracker over real recordings: a street seen from a driving car, and Opportunity's navcam.
+//! The tracker on real recordings: a street from a driving car, and Opportunity's navcam.
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -14,7 +14,7 @@ use sightline_track::target::{Designation, TrackingState};
 use sightline_world::target_truth::TruthKind;
 
 /// Pixels of the first frame on a scaffold (66 m), a parked car (37 m), a tree before a house (26 m), a hoarding (17 m)
-/// and a near car (13 m): five depths, all off the sky.
+/// and a near car (13 m): five depths, none on the sky.
 const STREET: [(f64, f64); 5] = [(727.0, 60.0), (665.0, 186.0), (880.0, 85.0), (204.0, 80.0), (790.0, 200.0)];
 
 fn imported(set: &Path, folder: &Path) -> Traverse {
@@ -27,18 +27,18 @@ fn designate(traverse: &Traverse, x: f64, y: f64) -> sightline_geometry::error::
     track::run(traverse, Designation::new(0, Pixel::new(x, y)), &Settings::default())
 }
 
-/// The target in the tree: its branches are outlines before a wall, a target against R20. It may be lost, not falsely
-/// tracked.
+/// The target in the tree: its branches are occluding outlines before a wall, contrary to R20. It may be lost, but not
+/// falsely tracked.
 const TREE: usize = 2;
 
-/// Located minus true pixel, where both are there and the target is tracked.
+/// Located minus true pixel, if both exist and the target is tracked.
 fn error_px(step: &RunStep) -> Option<(f64, f64)> {
     let (truth, located) = (step.truth.as_ref()?.left_pixel?, step.located()?.left_pixel?);
     (step.update.state == TrackingState::Tracking).then_some((located.x - truth.x, located.y - truth.y))
 }
 
 #[test]
-fn far_street_targets_move_alike_within_a_pixel_and_a_half_for_three_frames() {
+fn far_street_targets_agree_for_three_frames() {
     let Some(set) = data::set("kitti-seq1-frames-0-19", "tracking along a street") else { return };
     let folder = tempfile::tempdir().unwrap();
     let traverse = imported(&set, &folder.path().join("street"));
@@ -49,9 +49,9 @@ fn far_street_targets_move_alike_within_a_pixel_and_a_half_for_three_frames() {
             > 4.0 * distances.iter().fold(1e9_f64, |a, &b| a.min(b))
     );
     for step in 1..4 {
-        // The true poses of so short a sequence err by up to 0.16° a frame (the set's README), which moves all
-        // targets alike; their translation errs by 1.5 % of the way, which moves the near ones more. So the far
-        // ones, after their common motion, show the tracker's own error.
+        // The true poses of this short sequence have rotation errors of up to 0.16° per frame (the set's README), which move
+        // all targets equally, and translation errors of 1.5 %, which move near targets more. Far targets, relative to the
+        // common motion, therefore show the error of the tracker itself.
         let found: Vec<Option<(f64, f64)>> = runs.iter().map(|run| error_px(&run[step])).collect();
         let is_kept = |(target, error): (usize, &Option<_>)| target == TREE || error.is_some();
         assert!(found.iter().enumerate().all(is_kept), "all but the tree are tracked at step {step}");
@@ -71,7 +71,7 @@ fn far_street_targets_move_alike_within_a_pixel_and_a_half_for_three_frames() {
 }
 
 #[test]
-fn a_street_target_that_leaves_the_image_is_lost_and_says_so() {
+fn a_street_target_that_leaves_the_image_is_lost() {
     let Some(set) = data::set("kitti-seq1-frames-0-19", "losing a target that leaves the image") else {
         return;
     };
@@ -85,7 +85,7 @@ fn a_street_target_that_leaves_the_image_is_lost_and_says_so() {
 }
 
 #[test]
-fn pixels_of_one_opportunity_frame_are_found_in_the_other_within_half_a_pixel() {
+fn opportunity_pixels_are_matched_within_half_a_pixel() {
     let Some(set) = data::set("mer1-navcam-sol4087-pair", "the convergent navcam pair") else { return };
     let folder = tempfile::tempdir().unwrap();
     let traverse = imported(&set, &folder.path().join("pair"));

@@ -1,5 +1,5 @@
-//! Recordings on the server's machine: found, examined, imported and opened again, and refused in one sentence where they are
-//! outside of the named folders or damaged.
+//! Recordings on the server's machine: listed, examined, imported and opened again, and refused with one sentence if they
+//! are damaged or outside the named folders.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -15,7 +15,7 @@ use sightline_tests::server::{PORT, TestServer, access, copy_folder, small_drive
 use sightline_vision::image::{GrayImage, io};
 use tempfile::TempDir;
 
-/// How long an import may take.
+/// Maximum time of an import.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 /// A server whose pages may open the recordings below `root`.
@@ -27,7 +27,7 @@ fn server(drive: &Path, sessions: &Path, root: &[PathBuf]) -> TestServer {
     TestServer { app: app(state.clone()), state, traverse }
 }
 
-/// A folder with a KITTI recording `drive` of so many frames, 12 × 8 px.
+/// A folder with a KITTI recording `drive` of `frames` frames of 12 × 8 px.
 pub(crate) fn kitti(frames: usize) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let drive = folder.path().join("drive");
@@ -50,7 +50,7 @@ fn query(path: &Path) -> String {
     format!("recordings/contents?path={}", sightline_api::endpoint::escaped(path))
 }
 
-/// Imports the recording at `path`, and returns how the import ended.
+/// Imports the recording at `path`, and returns the final state of the import.
 async fn import(server: &TestServer, path: &Path) -> Value {
     let job = server.post("imports", &json!({ "path": path.to_str().unwrap() })).await.expect(202);
     ended(server, job["id"].as_str().unwrap()).await
@@ -68,13 +68,13 @@ pub(crate) async fn ended(server: &TestServer, id: &str) -> Value {
     }
 }
 
-/// The entries in the folder of imports.
-fn kept(sessions: &Path) -> usize {
+/// The number of entries in the folder of imports.
+fn file_count(sessions: &Path) -> usize {
     std::fs::read_dir(sessions.join("imported")).unwrap().count()
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_kitti_folder_is_found_examined_imported_and_open_after_a_restart() {
+async fn a_kitti_folder_is_imported_and_open_after_a_restart() {
     let (given, sessions, root) = (small_drive(), tempfile::tempdir().unwrap(), kitti(5));
     let roots = [root.path().to_owned()];
     let server = self::server(given.path(), sessions.path(), &roots);
@@ -94,7 +94,7 @@ async fn a_kitti_folder_is_found_examined_imported_and_open_after_a_restart() {
     assert_eq!(steps, [Some(0), Some(1), Some(2), Some(4)]);
     let last = json!({ "step": 4, "left": "image_0/000004.png", "right": "image_1/000004.png" });
     assert_eq!(view["pairs"][3], last);
-    assert_eq!(kept(sessions.path()), 0, "nothing is imported yet");
+    assert_eq!(file_count(sessions.path()), 0, "nothing is imported yet");
 
     let job = import(&server, &path).await;
     assert_eq!((&job["state"], &job["k"], &job["n"]), (&json!("done"), &json!(10), &json!(10)), "{job}");
@@ -103,7 +103,7 @@ async fn a_kitti_folder_is_found_examined_imported_and_open_after_a_restart() {
     assert_eq!(&left.bytes[1..4], b"PNG");
     let again = import(&server, &path).await;
     assert_eq!(
-        (&again["traverse"], kept(sessions.path())),
+        (&again["traverse"], file_count(sessions.path())),
         (&job["traverse"], 1),
         "the same recording is one drive"
     );
@@ -115,12 +115,12 @@ async fn a_kitti_folder_is_found_examined_imported_and_open_after_a_restart() {
     assert_eq!(server.get(&format!("sessions/{name}")).await.expect(200)["traverse"], json!(id));
     server.json(Method::DELETE, &format!("sessions/{name}"), &json!({})).await;
     let removed = server.json(Method::DELETE, &format!("traverses/{id}"), &json!({})).await;
-    assert_eq!((removed.status.as_u16(), kept(sessions.path())), (204, 0), "{}", removed.text());
+    assert_eq!((removed.status.as_u16(), file_count(sessions.path())), (204, 0), "{}", removed.text());
     assert!(path.join("calib.txt").is_file(), "the recording itself stays");
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_native_drive_is_opened_in_place_and_again_while_its_folder_is_named() {
+async fn a_native_drive_opens_in_place_while_its_folder_is_named() {
     let (given, sessions, root) = (small_drive(), tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let path = root.path().canonicalize().unwrap().join("mine");
     copy_folder(small_recording().path(), &path);
@@ -144,7 +144,7 @@ async fn a_native_drive_is_opened_in_place_and_again_while_its_folder_is_named()
     drop(unnamed);
     let named = self::server(given.path(), sessions.path(), &roots);
     let removed = named.json(Method::DELETE, &format!("traverses/{id}"), &json!({})).await;
-    assert_eq!((removed.status.as_u16(), kept(sessions.path())), (204, 0));
+    assert_eq!((removed.status.as_u16(), file_count(sessions.path())), (204, 0));
     assert!(path.join("traverse.toml").is_file(), "the drive itself stays");
 }
 
@@ -186,7 +186,7 @@ async fn recorded_excerpts_are_recognised_with_their_stereo_pairs() {
 type Damage = fn(&Path);
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_damaged_recording_is_refused_with_its_file_and_nothing_is_kept() {
+async fn a_damaged_recording_is_rejected_without_leftovers() {
     let cases: [(Damage, &str); 6] = [
         (|drive| std::fs::remove_file(drive.join("image_1/000002.png")).unwrap(), "image_1/000002.png"),
         (|drive| std::fs::write(drive.join("calib.txt"), "P0: 1 2 3\n").unwrap(), "calib.txt"),
@@ -211,7 +211,7 @@ async fn a_damaged_recording_is_refused_with_its_file_and_nothing_is_kept() {
         let job = import(&server, Path::new("drive")).await;
         assert_eq!((&job["state"], &job["traverse"]), (&json!("failed"), &json!(null)));
         assert!(job["problem"].as_str().unwrap().contains(named), "{job}");
-        assert_eq!((kept(sessions.path()), server.state.traverses().len()), (0, 1));
+        assert_eq!((file_count(sessions.path()), server.state.traverses().len()), (0, 1));
     }
 }
 
@@ -265,5 +265,5 @@ async fn a_cancelled_import_leaves_nothing_behind() {
     server.post(&format!("imports/{id}/cancel"), &json!({})).await.expect(200);
     let job = ended(&server, id).await;
     assert_eq!((&job["state"], &job["problem"]), (&json!("cancelled"), &json!(null)), "{job}");
-    assert_eq!((kept(sessions.path()), server.state.traverses().len()), (0, 1));
+    assert_eq!((file_count(sessions.path()), server.state.traverses().len()), (0, 1));
 }

@@ -1,5 +1,5 @@
-//! A number that a stage declares is in every view of the record, although none of them names it. (The views of the page
-//! are tested where they are: `viewer/src/tests/records.rs`.)
+//! A number that a stage declares is in every view of the record, although none of them names it. (The views of the page are
+//! tested in `viewer/src/tests/records.rs`.)
 
 use std::io::Write;
 
@@ -13,7 +13,7 @@ use sightline_session::records::{self, StageQuantity};
 use sightline_tests::rrd;
 use sightline_tests::server::{TestServer, request, small_drive};
 
-/// The number: declared in the `impl Record` of its stage, and no field of the evidence.
+/// The number: declared in the `impl Record` of its stage, and not a field of the evidence.
 const NAME: &str = "match_template.match_sigma_px";
 const STEP: usize = 2;
 
@@ -62,7 +62,7 @@ async fn one_declaration_puts_a_number_into_every_view() {
     assert_eq!((&column["name"], &column["unit"]), (&json!(NAME), &json!("px")));
     assert_eq!(column["values"][0][STEP].as_f64(), Some(value));
 
-    // Expressions, and with them breakpoints and derived plots.
+    // Expressions, and through them breakpoints and derived plots.
     let asked = json!({ "expression": NAME, "values": true, "target": 0 });
     let answer = server.post(&format!("sessions/{session}/query"), &asked).await.expect(200);
     assert_eq!(answer["unit"], json!("px"));

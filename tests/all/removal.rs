@@ -1,5 +1,4 @@
-//! Removing sessions, drives and targets: what is removed gives its memory back, other pages are told, and what a person may
-//! want back comes back.
+//! Removing sessions, drives and targets: memory is released, other pages are notified, and removals can be undone.
 
 use std::sync::{Arc, Weak};
 use std::time::{Duration, Instant};
@@ -13,7 +12,7 @@ async fn delete(server: &TestServer, path: &str) -> u16 {
     server.json(Method::DELETE, path, &json!({})).await.status.as_u16()
 }
 
-/// Opens another drive than the one that the server was given, and returns its name.
+/// Opens a drive other than the server's first one, and returns its name.
 async fn other_drive(server: &TestServer) -> String {
     let other = Scenario { name: "other drive".to_owned(), seed: 77, ..small_scenario() };
     let entry = server.post("traverses", &json!({ "scenario": other.to_toml() })).await.expect(201);
@@ -21,7 +20,7 @@ async fn other_drive(server: &TestServer) -> String {
     entry["id"].as_str().unwrap().to_owned()
 }
 
-/// Waits until nobody uses a value any more.
+/// Waits until a value has no owner.
 async fn freed<T>(weak: Weak<T>) {
     let begun = Instant::now();
     while weak.upgrade().is_some() {
@@ -31,7 +30,7 @@ async fn freed<T>(weak: Weak<T>) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_removed_session_is_gone_for_good_unless_it_is_restored() {
+async fn a_removed_session_can_be_restored_until_it_is_discarded() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), folder.path());
     let session = server.begin().await;
@@ -42,10 +41,10 @@ async fn a_removed_session_is_gone_for_good_unless_it_is_restored() {
     let path = format!("sessions/{session}");
     let mut events = server.state.events().subscribe();
     assert_eq!(delete(&server, &path).await, 204);
-    // On a busy machine events of the run may come after its end.
-    let mut told =
+    // On a busy machine events of the run may arrive after its end.
+    let mut sent =
         std::iter::from_fn(|| events.try_recv().ok()).map(|event| serde_json::to_value(event).unwrap());
-    assert!(told.any(|event| event == json!({ "event": "session_removed", "session": session })));
+    assert!(sent.any(|event| event == json!({ "event": "session_removed", "session": session })));
     server.get(&path).await.problem(404, "not_found");
     assert_eq!(delete(&server, &path).await, 404);
     assert_eq!(server.get("sessions").await.expect(200), json!([]));
@@ -65,7 +64,7 @@ async fn a_removed_session_is_gone_for_good_unless_it_is_restored() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_session_that_is_removed_while_it_computes_ends_and_gives_its_memory_back() {
+async fn a_session_removed_while_computing_frees_its_memory() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), folder.path());
     let session = server.begin().await;
@@ -94,10 +93,10 @@ async fn a_drive_without_sessions_is_removed_with_its_folder() {
     let open = Arc::downgrade(&server.state.traverse(&id).unwrap());
     let mut events = server.state.events().subscribe();
     assert_eq!(delete(&server, &path).await, 204);
-    let told: Vec<Value> = std::iter::from_fn(|| events.try_recv().ok())
+    let sent: Vec<Value> = std::iter::from_fn(|| events.try_recv().ok())
         .map(|event| serde_json::to_value(event).unwrap())
         .collect();
-    assert!(told.contains(&json!({ "event": "traverse_removed", "traverse": id })), "{told:?}");
+    assert!(sent.contains(&json!({ "event": "traverse_removed", "traverse": id })), "{sent:?}");
     assert_eq!(std::fs::read_dir(&made).unwrap().count(), 0);
     freed(open).await;
     server.get(&path).await.problem(404, "not_found");
@@ -106,7 +105,7 @@ async fn a_drive_without_sessions_is_removed_with_its_folder() {
     drop(server);
     let server = TestServer::open(drive.path(), folder.path());
     assert_eq!(server.get("traverses").await.expect(200).as_array().unwrap().len(), 1);
-    // Images without an index, as an interrupted removal leaves them, do not block the drive.
+    // Images without an index, as left by an interrupted removal, do not block the drive.
     assert_eq!(other_drive(&server).await, id);
     let own = std::fs::read_dir(&made).unwrap().next().unwrap().unwrap().path();
     assert_eq!(delete(&server, &path).await, 204);
@@ -120,7 +119,7 @@ async fn removed_targets_do_not_count() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), folder.path());
     let session = server.begin().await;
-    // What a person did who picked and removed 300 times.
+    // The session of a user who picked and removed a target 300 times.
     server.pick(&session).await;
     server.ended(&session, 0, 0).await;
     let mut saved = server.state.store().load().unwrap().sessions.remove(0);

@@ -1,5 +1,5 @@
-//! The `.rrd` export and the live stream, on a short simulated drive with a missing image and covered eyes; and the
-//! entities of the feature tracker, from tables made up for the same drive (`shape`: those of the shape tracker).
+//! The `.rrd` export and the live stream, on a short simulated drive with a missing image and covered cameras; and the
+//! entities of the feature tracker, from synthetic tables for the same drive (`shape`: those of the shape tracker).
 
 mod odometry;
 mod shape;
@@ -16,8 +16,8 @@ use sightline_server::rerun_log::{
 };
 use sightline_session::step::RunStep;
 use sightline_session::{Session, track};
+use sightline_tests::faulty_drive::FaultyDrive;
 use sightline_tests::rrd::{self, EntityRows, Recording};
-use sightline_tests::troubled::Troubled;
 use sightline_track::locate::Evidence;
 use sightline_track::locate::features::FeatureEvidence;
 use sightline_track::locate::features::evidence::{
@@ -28,19 +28,20 @@ use sightline_track::target::{Designation, TrackingState};
 
 /// The stop whose image is missing.
 const MISSING: usize = 2;
-/// The stop at which both eyes are covered.
+/// The stop at which both cameras are covered.
 const COVERED: usize = 4;
 
 /// The drive and the runs of two targets, tracked once for all tests.
 struct Fixture {
-    drive: Troubled,
+    drive: FaultyDrive,
     runs: Vec<Vec<Arc<RunStep>>>,
     _folder: tempfile::TempDir,
 }
 
 static FIXTURE: LazyLock<Fixture> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
-    let drive = Troubled { missing: vec![MISSING], covered: vec![COVERED], ..Troubled::short(folder.path()) };
+    let drive =
+        FaultyDrive { missing: vec![MISSING], covered: vec![COVERED], ..FaultyDrive::short(folder.path()) };
     let run = |pixel: &Pixel| {
         let designation = Designation::new(0, *pixel);
         let steps = track::run(&drive, designation, &Settings::default()).unwrap();
@@ -77,7 +78,7 @@ fn names(folder: &Path) -> Vec<String> {
         .collect()
 }
 
-/// The steps with and without data that the documentation promises.
+/// The steps with and without data that the documentation specifies.
 fn promised(rows: Rows, doc: &sightline_server::rerun_log::EntityDoc, steps: &[Arc<RunStep>]) -> EntityRows {
     let split = |wanted: bool| {
         steps.iter().filter(|t| doc.has_data_at(t) == wanted).map(|t| t.step as i64).collect::<Vec<_>>()
@@ -99,7 +100,7 @@ fn sorted(mut steps: Vec<i64>) -> Vec<i64> {
 }
 
 #[test]
-fn an_export_holds_every_documented_entity_with_the_documented_rows_and_no_other() {
+fn an_export_has_exactly_the_documented_entities() {
     let recording = FIXTURE.exported();
     let shared = shared_entities().into_iter().map(|doc| (0, doc));
     let own =
@@ -130,7 +131,7 @@ fn an_export_holds_every_documented_entity_with_the_documented_rows_and_no_other
     assert!(undocumented.is_empty(), "not in the documentation: {undocumented:?}");
 }
 
-/// Three features: one alone, an inlier and an outlier; a target moved by half a pixel of residual.
+/// Three features: an unmatched one, an inlier and an outlier; the target has moved by half a pixel of residual.
 fn by_features(trace: &RunStep) -> RunStep {
     let mut trace = trace.clone();
     let (is_pick, Some(located)) = (trace.prediction().is_none(), trace.located_mut()) else { return trace };
@@ -167,7 +168,7 @@ fn by_features(trace: &RunStep) -> RunStep {
     trace
 }
 
-/// The recording of a run, whose every entity has data and is cleared at the steps that its documentation promises.
+/// The recording of a run; asserts that every entity has data and is cleared at the steps that its documentation specifies.
 fn exported_as_promised(steps: &[Arc<RunStep>]) -> rrd::Recording {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.rrd");
@@ -183,7 +184,7 @@ fn exported_as_promised(steps: &[Arc<RunStep>]) -> rrd::Recording {
 }
 
 #[test]
-fn a_run_by_features_has_its_keypoints_matches_residuals_points_and_cloud() {
+fn a_feature_run_logs_keypoints_matches_and_points() {
     let steps: Vec<_> = FIXTURE.runs[0].iter().map(|trace| Arc::new(by_features(trace))).collect();
     let recording = exported_as_promised(&steps);
     let step = 1;
@@ -200,7 +201,7 @@ fn a_run_by_features_has_its_keypoints_matches_residuals_points_and_cloud() {
     assert_eq!(numbers("fit_motion/inliers", "Scalars:scalars"), [1.0]);
     assert_eq!(numbers("bootstrap/cloud", "Points3D:positions").len(), 2 * 3);
     assert_eq!(numbers("bootstrap/left", "Points2D:positions"), [200.5, 210.5]);
-    // Both kinds of matches are there, each in an entity and a colour of its own.
+    // Both kinds of matches exist, each in an entity and a colour of its own.
     for kind in ["inliers", "outliers"] {
         let path = format!("/target_1/locate/match_features/{kind}");
         assert!(recording.entities[&path].data.contains(&step), "{kind}");
@@ -216,7 +217,7 @@ fn the_fixture_has_a_fault_a_loss_and_a_recovery() {
 }
 
 #[test]
-fn a_step_without_images_clears_its_scores_and_still_says_what_is_wrong() {
+fn a_step_without_images_clears_scores_and_logs_the_fault() {
     let recording = FIXTURE.exported();
     let at = MISSING as i64;
     for path in ["/capture/left", "/target_1/judge/ncc", "/target_1/locate/match_template/surface"] {
@@ -229,7 +230,7 @@ fn a_step_without_images_clears_its_scores_and_still_says_what_is_wrong() {
 }
 
 #[test]
-fn numbers_and_positions_come_back_as_the_trace_has_them_half_a_pixel_further() {
+fn numbers_round_trip_and_pixels_are_shifted_by_a_half() {
     let recording = FIXTURE.exported();
     let number = |path: &str, component: &str, step: usize| {
         recording.entities[path].numbers[&(component.to_owned(), step as i64)].clone()
@@ -265,7 +266,7 @@ fn the_layout_is_in_the_file_and_shall_be_shown() {
 }
 
 #[test]
-fn a_cancelled_export_leaves_nothing_and_an_existing_file_is_kept() {
+fn a_cancelled_export_leaves_existing_files_only() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("short.rrd");
     let mut seen = Vec::new();
@@ -299,7 +300,7 @@ fn stream_threads() -> usize {
     names.filter(|name| name.starts_with("RecordingStream") || name.starts_with("ChunkBatcher")).count()
 }
 
-/// Each leaked eight threads, and each further target of a live stream six; other tests have a few of their own.
+/// Once each export leaked eight threads, and each further live target six; other tests have a few threads of their own.
 #[cfg(target_os = "linux")]
 #[test]
 fn exports_and_live_targets_leave_no_threads_behind() {

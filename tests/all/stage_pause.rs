@@ -1,5 +1,5 @@
-//! Pauses between the stages of a commanded drive by REST: the same bits as without them, the world put off with the stages, another
-//! setting on the same inputs, and the same pause after a kill.
+//! Pauses between the stages of a drive on commands by REST: the same bits as without pauses, actions of the world deferred
+//! with the stages, another setting on the same inputs, and the same pause after a kill.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -12,9 +12,9 @@ use crate::cli::program;
 use crate::driving::{
     begin, by_command_line, command, exported, has_ended, rows, traverse_of, wait, waited, waits_at,
 };
-use crate::keeping::Killable;
+use crate::persistence::ServerProcess;
 
-/// The stages of a stop in running order.
+/// The stages of a stop, in the order of execution.
 const STAGES: [&str; 9] =
     ["predict", "point_mast", "capture", "locate", "judge", "update", "set_goal", "select_path", "drive"];
 
@@ -25,13 +25,13 @@ fn is_paused(stop: usize, before: &str) -> impl Fn(&Value) -> bool {
     }
 }
 
-/// A command to wait before or after a stage.
+/// A command to pause before or after a stage.
 fn steering(run: usize, pause_at: usize, when: &str, stage: &str) -> Value {
     let pause = json!({ "when": when, "stage": stage });
     json!({ "target": 0, "run": run, "command": command(), "pause_at": pause_at, "pause": pause })
 }
 
-/// The pause before a stage, said in one way or the other.
+/// The pause before a stage, also expressible as the pause after the previous one.
 fn pause_before(stop: usize, stage: usize, is_after: bool) -> Value {
     match (is_after, stage) {
         (false, _) => steering(0, stop, "before", STAGES[stage]),
@@ -44,19 +44,19 @@ fn step_path(session: &str, run: usize, step: usize) -> String {
     format!("sessions/{session}/targets/0/runs/{run}/steps/{step}")
 }
 
-/// The states of a world in its folder.
+/// The stored states of a world, from its folder.
 fn world(folder: &Path) -> Vec<Value> {
     serde_json::from_slice(&std::fs::read(folder.join("driven.json")).unwrap()).unwrap()
 }
 
-/// A drive that is never paused, beside the one that is compared with it.
-struct Whole {
+/// A drive that is never paused, or the one that is compared with it.
+struct ComparedDrive {
     session: String,
     traverse: String,
     folder: PathBuf,
 }
 
-impl Whole {
+impl ComparedDrive {
     async fn drive(server: &TestServer, data: &Path) -> Self {
         let session = begin(server, &json!({ "command": command() })).await;
         waited(server, &session, has_ended).await;
@@ -65,10 +65,15 @@ impl Whole {
     }
 }
 
-/// Checks what exists of a stop while the drive is paused before a stage of it.
-async fn check_pause(server: &TestServer, whole: &Whole, paused: &Whole, (stop, stage): (usize, usize)) {
+/// Checks which data of a stop exist while the drive is paused before a stage of it.
+async fn check_pause(
+    server: &TestServer,
+    unpaused: &ComparedDrive,
+    paused: &ComparedDrive,
+    (stop, stage): (usize, usize),
+) {
     let place = format!("stop {stop}, before {}", STAGES[stage]);
-    let expected = server.get(&step_path(&whole.session, 0, stop)).await.expect(200);
+    let expected = server.get(&step_path(&unpaused.session, 0, stop)).await.expect(200);
     let found = server.get(&step_path(&paused.session, 0, stop)).await;
     match stage {
         0 => drop(found.problem(404, "not_found")),
@@ -78,7 +83,7 @@ async fn check_pause(server: &TestServer, whole: &Whole, paused: &Whole, (stop, 
             for (k, name) in STAGES[..6].iter().enumerate() {
                 match (k < stage, stage) {
                     (false, _) => assert_eq!(found[name], json!(null), "{place}: {name}"),
-                    // Vision corrects the pose once the images are taken; until then it is that of wheels and gyro.
+                    // Vision corrects the pose once the images are taken; before, it is that of wheels and gyro.
                     (true, 1 | 2) => assert_ne!(found[name], expected[name], "{place}: {name}"),
                     (true, _) => assert_eq!(found[name], expected[name], "{place}: {name}"),
                 }
@@ -87,7 +92,7 @@ async fn check_pause(server: &TestServer, whole: &Whole, paused: &Whole, (stop, 
         }
         _ => assert_eq!(found.expect(200), expected, "{place}"),
     }
-    let (state, wanted) = (world(&paused.folder), world(&whole.folder));
+    let (state, wanted) = (world(&paused.folder), world(&unpaused.folder));
     assert_eq!(state.len(), stop + 1, "{place}");
     let pointed = if stage < 2 { &state[stop - 1] } else { &wanted[stop] };
     assert_eq!(state[stop]["mast_angles"], pointed["mast_angles"], "{place}");
@@ -108,45 +113,45 @@ async fn check_pause(server: &TestServer, whole: &Whole, paused: &Whole, (stop, 
         let images = std::fs::read_dir(paused.folder.join("images")).map_or(0, Iterator::count);
         assert_eq!(images, 2 * stop, "{place}: nothing is rendered");
     } else {
-        assert!(taken.bytes == server.get(&image(&whole.traverse)).await.bytes, "{place}: the image");
+        assert!(taken.bytes == server.get(&image(&unpaused.traverse)).await.bytes, "{place}: the image");
     }
 }
 
-/// Checks the decisions that are told while the drive is paused before a stage of a stop.
+/// Checks the reported decisions while the drive is paused before a stage of a stop.
 fn check_decisions(drive: &Value, cycles: &[Value], (stop, stage): (usize, usize)) {
-    let told = drive["cycles"].as_array().unwrap();
+    let reported = drive["cycles"].as_array().unwrap();
     match stage {
-        ..=6 => assert_eq!(told.len(), stop, "{drive}"),
+        ..=6 => assert_eq!(reported.len(), stop, "{drive}"),
         7 => {
-            assert_eq!(told[stop]["goal"], cycles[stop]["goal"]);
-            assert_eq!(told[stop]["motion"], json!(null));
+            assert_eq!(reported[stop]["goal"], cycles[stop]["goal"]);
+            assert_eq!(reported[stop]["motion"], json!(null));
         }
         _ => {
-            assert_eq!(told[stop]["motion"], cycles[stop]["motion"]);
-            assert_eq!(told[stop]["report"], json!(null), "the rover has not moved");
+            assert_eq!(reported[stop]["motion"], cycles[stop]["motion"]);
+            assert_eq!(reported[stop]["report"], json!(null), "the rover has not moved");
         }
     }
-    assert_eq!(told[..stop], cycles[..stop]);
+    assert_eq!(reported[..stop], cycles[..stop]);
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_drive_stepped_through_every_stage_has_the_bits_of_one_that_is_never_paused() {
+async fn pausing_at_every_stage_does_not_change_a_drive() {
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let (wanted, cycles, summary) = by_command_line(drive.path());
     let server = TestServer::open(drive.path(), folder.path());
-    let whole = Whole::drive(&server, folder.path()).await;
+    let unpaused = ComparedDrive::drive(&server, folder.path()).await;
     let session = begin(&server, &json!({ "command": command(), "pause_at": 0 })).await;
     waited(&server, &session, is_paused(0, "drive")).await;
     let traverse = traverse_of(&server, &session).await;
-    let paused = Whole { folder: folder.path().join("driven").join(&traverse), session, traverse };
+    let paused = ComparedDrive { folder: folder.path().join("driven").join(&traverse), session, traverse };
     let path = format!("sessions/{}/drive", paused.session);
     for stop in 1..=2 {
         for (stage, before) in STAGES.into_iter().enumerate() {
-            // Both ways to say the same pause, each of them at every stage.
-            let told = pause_before(stop, stage, (stop + stage) % 2 == 0);
-            server.json(Method::PUT, &path, &told).await.expect(200);
+            // Each stage is tested with one of the two forms of the same pause, in turn.
+            let pause_command = pause_before(stop, stage, (stop + stage) % 2 == 0);
+            server.json(Method::PUT, &path, &pause_command).await.expect(200);
             let drive = waited(&server, &paused.session, is_paused(stop, before)).await;
-            check_pause(&server, &whole, &paused, (stop, stage)).await;
+            check_pause(&server, &unpaused, &paused, (stop, stage)).await;
             check_decisions(&drive, &cycles, (stop, stage));
         }
     }
@@ -158,10 +163,10 @@ async fn a_drive_stepped_through_every_stage_has_the_bits_of_one_that_is_never_p
     assert_eq!((&ended["cycles"], &ended["summary"]), (&json!(cycles), &summary));
     assert_eq!(ended["paused"], json!(null));
     assert_eq!(exported(&server, &paused.session, 0).await, wanted);
-    assert_eq!(world(&paused.folder), world(&whole.folder));
+    assert_eq!(world(&paused.folder), world(&unpaused.folder));
     for stop in 0..wanted.len() {
         let image = |traverse: &str| format!("traverses/{traverse}/steps/{stop}/images/right.png");
-        let [one, other] = [&paused.traverse, &whole.traverse].map(|traverse| image(traverse));
+        let [one, other] = [&paused.traverse, &unpaused.traverse].map(|traverse| image(traverse));
         assert!(server.get(&one).await.bytes == server.get(&other).await.bytes, "stop {stop}");
     }
 }
@@ -177,7 +182,7 @@ async fn a_setting_changed_at_a_pause_is_used_on_the_same_inputs() {
     let before = server.get(&step_path(&session, 0, 3)).await.expect(200);
     assert_eq!((&before["judge"], &before["begun"]["before"]), (&json!(null), &json!("judge")));
 
-    // The step again with a limit that no match meets: up to the pause it is the same.
+    // The step again with a limit that no match passes: it is the same up to the pause.
     let fork = json!({ "run": 0, "from_step": 3, "settings": { "ncc_min": 0.9999 } });
     server.post(&format!("sessions/{session}/targets/0/runs"), &fork).await.expect(202);
     let run = format!("sessions/{session}/targets/0/runs/1");
@@ -191,15 +196,15 @@ async fn a_setting_changed_at_a_pause_is_used_on_the_same_inputs() {
     let again = server.get(&step_path(&session, 1, 3)).await.expect(200);
     assert_eq!(again, before);
 
-    // A tried setting stops at the pause, too.
+    // A what-if also stops at the pause.
     let tried = json!({ "settings": { "ncc_min": 0.9999 } });
     let ghost = server.post(&format!("{}/what_if", step_path(&session, 0, 3)), &tried).await.expect(200);
     assert_eq!(ghost["verdict"], json!(null), "{ghost}");
 
     // Continued with the new limit, the step is rejected; with the former one it is not.
     let path = format!("sessions/{session}/drive");
-    let told = steering(1, 3, "after", "judge");
-    server.json(Method::PUT, &path, &told).await.expect(200);
+    let pause_command = steering(1, 3, "after", "judge");
+    server.json(Method::PUT, &path, &pause_command).await.expect(200);
     waited(&server, &session, is_paused(3, "update")).await;
     let judged = server.get(&step_path(&session, 1, 3)).await.expect(200);
     assert_eq!((&judged["judge"]["good"], &judged["update"]), (&json!(false), &json!(null)));
@@ -210,16 +215,16 @@ async fn a_setting_changed_at_a_pause_is_used_on_the_same_inputs() {
     let rejected = server.get(&step_path(&session, 1, 3)).await.expect(200);
     assert_eq!(rejected["judge"], judged["judge"]);
     assert_ne!(rejected["update"], json!(null));
-    // The run that drove before was tracked along, as if it had never waited.
+    // The run that drove before was tracked to the end, with the same result as without a pause.
     server.ended(&session, 0, 0).await;
     assert_eq!(exported(&server, &session, 0).await, wanted[..4]);
 }
 
 #[test]
-fn a_drive_killed_at_a_pause_waits_there_again_with_the_same_record() {
+fn a_drive_killed_at_a_pause_resumes_with_the_same_record() {
     let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
     let (wanted, cycles, _) = by_command_line(drive.path());
-    let mut server = Killable::start(drive.path(), data.path());
+    let mut server = ServerProcess::start(drive.path(), data.path());
     let traverse = server.get("traverses")[0]["id"].clone();
     server.json("POST", "sessions", &json!({ "traverse": traverse }));
     let [x, y] = PIXEL;
@@ -237,7 +242,7 @@ fn a_drive_killed_at_a_pause_waits_there_again_with_the_same_record() {
         let record = (before != "predict").then(|| server.get(&step_path("s2", 0, stop)));
         let exported = server.raw("GET", rows_path, "", "");
         server.kill();
-        // The command line exports the drive as it is paused, without driving on.
+        // The command line exports the paused drive without continuing it.
         let out = data.path().join("rows.jsonl");
         let mut command = Command::new(program());
         command.args(["export", "rows.jsonl", "--session", "s2", "--data-dir"]).arg(data.path());
@@ -245,7 +250,7 @@ fn a_drive_killed_at_a_pause_waits_there_again_with_the_same_record() {
         assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
         assert_eq!(std::fs::read_to_string(&out).unwrap(), exported, "before {before}");
         std::fs::remove_file(out).unwrap();
-        server = Killable::start(drive.path(), data.path());
+        server = ServerProcess::start(drive.path(), data.path());
         assert_eq!(wait(|| server.get("sessions/s2/drive"), is_paused(stop, before)), waits);
         if let Some(record) = record {
             assert_eq!(server.get(&step_path("s2", 0, stop)), record, "before {before}");

@@ -1,4 +1,4 @@
-//! Studies: a small slice through the command line, stopped and resumed, and the same as a job over REST.
+//! Studies: a small part of one through the command line, stopped and resumed, and the same as a job over REST.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -45,7 +45,7 @@ fn rows(output: &Output) -> Vec<Value> {
 }
 
 #[test]
-fn a_study_resumes_where_it_was_stopped_and_prints_its_rows_alone() {
+fn a_stopped_study_resumes_and_prints_only_its_rows() {
     let home = tempfile::tempdir().unwrap();
     let (scenario, out) = (home.path().join("small.toml"), home.path().join("out"));
     std::fs::write(&scenario, small().to_toml()).unwrap();
@@ -59,7 +59,7 @@ fn a_study_resumes_where_it_was_stopped_and_prints_its_rows_alone() {
     assert_eq!((&first[0]["targets"], &first[0]["tracked"]), (&json!(3), &json!(3)), "{first:?}");
     assert!(first[0]["err_m_median"].as_f64().unwrap() < 0.03, "{first:?}");
 
-    // Killed in the middle of its second line: that line is dropped, the first is kept.
+    // A kill while the second line is written: that line is dropped, the first is valid.
     let results = out.join("approach/results.jsonl");
     let kept = std::fs::read_to_string(&results).unwrap();
     std::fs::write(&results, format!("{kept}{}", &kept[..kept.len() / 2])).unwrap();
@@ -83,7 +83,7 @@ fn a_study_resumes_where_it_was_stopped_and_prints_its_rows_alone() {
 }
 
 #[test]
-fn a_world_whose_one_target_lies_in_its_centre_counts_as_one_of_those_asked_for() {
+fn a_world_with_one_central_target_counts() {
     let home = tempfile::tempdir().unwrap();
     let (scenario, out) = (home.path().join("centre.toml"), home.path().join("out"));
     let mut centre = small();
@@ -178,7 +178,7 @@ fn the_share_of_a_study_grows_while_its_world_is_rendered() {
     assert!(shares.len() > 1 && shares.is_sorted_by(|a, b| a < b), "{shares:?}");
 }
 
-/// Waits until the first study has ended, and returns how it stands.
+/// Waits until the first study has ended, and returns its view.
 async fn ended(server: &TestServer) -> Value {
     for _ in 0..2400 {
         let job = server.get("studies/jobs/study-1").await.expect(200);

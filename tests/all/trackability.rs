@@ -1,4 +1,4 @@
-//! Trackability over REST: the map in the background, a pixel, a refusal with a way out; and the drive of a new user.
+//! Trackability over REST: the map in the background, a pixel, a refusal with an alternative; and the drive of a new user.
 
 use std::time::{Duration, Instant};
 
@@ -21,14 +21,14 @@ use std::sync::atomic::AtomicBool;
 /// A pixel of the sky in the first image of the small drive.
 const SKY: [f64; 2] = [128.0, 20.0];
 
-/// An approach with places where a target does well, which the small drive lacks.
+/// An approach with trackable pixels, which the small drive lacks.
 fn approach() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     create_simulated(&short_approach(), folder.path()).unwrap();
     folder
 }
 
-/// Asks for a map until it has ended.
+/// Polls a map until it is complete.
 async fn map_of(server: &TestServer, step: usize) -> Value {
     let path = format!("traverses/{}/steps/{step}/trackability", server.traverse);
     let begun = Instant::now();
@@ -43,7 +43,7 @@ async fn map_of(server: &TestServer, step: usize) -> Value {
 }
 
 #[tokio::test]
-async fn a_map_is_made_in_the_background_and_its_nearest_good_pixel_can_be_designated() {
+async fn the_nearest_good_pixel_of_a_map_can_be_designated() {
     let (drive, sessions) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), sessions.path());
     let mut events = server.state.events().subscribe();
@@ -56,15 +56,15 @@ async fn a_map_is_made_in_the_background_and_its_nearest_good_pixel_can_be_desig
         std::iter::from_fn(|| events.try_recv().ok()).map(|event| serde_json::to_value(event).unwrap());
     let last = told.filter(|event| event["event"] == "trackability_progress").last().expect("an event");
     assert_eq!((&last["step"], &last["ended"]), (&json!(0), &json!(true)));
-    // The sky has no range, and says so.
+    // The sky has no range, and this is its reason.
     let sky = map.at(sightline_geometry::frames::Pixel::new(SKY[0], SKY[1])).unwrap();
     assert_eq!(sky.verdict, Verdict::Bad);
-    // What is kept is answered at once and is the same.
+    // A stored map is returned immediately and is the same.
     assert_eq!(map_of(&server, 0).await, progress);
 }
 
 #[tokio::test]
-async fn a_pixel_is_judged_by_its_designation_with_criteria_that_have_units_and_sources() {
+async fn a_pixel_verdict_lists_gates_with_units_and_sources() {
     let (drive, sessions) = (approach(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), sessions.path());
     let path =
@@ -81,7 +81,7 @@ async fn a_pixel_is_judged_by_its_designation_with_criteria_that_have_units_and_
         (&json!("good"), &json!(null), &json!(null))
     );
     let range_m = found["range_m"].as_f64().unwrap();
-    // The step is of dense stereo, the range of point stereo: they agree within a part in a hundred.
+    // The step length uses dense stereo, the range point stereo: they agree within 1 %.
     assert!(found["longest_step_m"].as_f64().unwrap() <= 0.101 * range_m, "{found}");
     for criterion in found["criteria"].as_array().unwrap() {
         assert!(criterion["source"].as_str().is_some_and(|source| !source.is_empty()), "{criterion}");
@@ -95,7 +95,7 @@ async fn a_pixel_is_judged_by_its_designation_with_criteria_that_have_units_and_
 }
 
 #[tokio::test]
-async fn a_refused_pick_offers_the_nearest_good_pixel_and_that_one_is_taken() {
+async fn a_rejected_pick_offers_the_nearest_good_pixel() {
     let (drive, sessions) = (approach(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), sessions.path());
     let session = server.begin().await;
@@ -108,14 +108,14 @@ async fn a_refused_pick_offers_the_nearest_good_pixel_and_that_one_is_taken() {
         (problem["nearest_pixel"]["x"].as_f64().unwrap(), problem["nearest_pixel"]["y"].as_f64().unwrap());
     assert!(problem["hint"].as_str().unwrap().contains("nearest good pixel"), "{problem}");
     server.post(&path, &pick(x, y)).await.expect(201);
-    // A pixel that is none has no neighbour to offer.
+    // For a pixel outside the image no nearest pixel is offered.
     let outside = server.post(&path, &pick(-40.0, 128.0)).await;
     outside.problem(422, "target");
     assert_eq!(outside.json().get("nearest_pixel"), None);
 }
 
 #[tokio::test]
-async fn a_map_that_is_complete_cannot_be_cancelled_and_one_of_a_damaged_stop_says_why() {
+async fn complete_maps_cannot_be_cancelled_and_failed_ones_explain() {
     let (drive, sessions) = (small_drive(), tempfile::tempdir().unwrap());
     for eye in ["left", "right"] {
         std::fs::write(drive.path().join(format!("images/{eye}_0002.png")), b"no picture").unwrap();
@@ -134,13 +134,13 @@ async fn a_map_that_is_complete_cannot_be_cancelled_and_one_of_a_damaged_stop_sa
 }
 
 #[tokio::test]
-async fn a_map_under_way_can_be_given_up_and_asked_for_again() {
+async fn a_map_in_progress_can_be_cancelled_and_requested_again() {
     let (drive, sessions) = (small_drive(), tempfile::tempdir().unwrap());
     let server = TestServer::open(drive.path(), sessions.path());
     let path = format!("traverses/{}/steps/0/trackability", server.traverse);
     let begun = server.get(&path).await.expect(200);
     let cancelled = server.post(&format!("{path}/cancel"), &json!({})).await;
-    // On a quick machine it may be complete already; then there is nothing to cancel.
+    // On a fast machine it may be complete already; then there is nothing to cancel.
     if begun["ended"] == json!(false) && cancelled.status.as_u16() == 200 {
         let progress = cancelled.json();
         assert_eq!((&progress["ended"], &progress["failed"]), (&json!(true), &json!("cancelled")));
@@ -149,11 +149,11 @@ async fn a_map_under_way_can_be_given_up_and_asked_for_again() {
 }
 
 #[test]
-fn the_first_drive_loses_its_target_where_the_heading_jumps_and_a_wider_search_window_saves_it() {
+fn a_wider_search_window_saves_the_first_drive() {
     let folder = tempfile::tempdir().unwrap();
     let scenario = library::scenario(library::FIRST).unwrap();
     let traverse = create_simulated(&scenario, folder.path()).unwrap();
-    // Every ninth stop, up to the one after the jump, which comes with the third.
+    // Every ninth stop, up to the one after the heading jump, which is at the third visited stop.
     let visit = Visit::Every(9);
     for stop in visit.stops(traverse.stop_count()).into_iter().take(4) {
         traverse.render_step(stop, &AtomicBool::new(false)).unwrap();
@@ -178,12 +178,12 @@ fn the_first_drive_loses_its_target_where_the_heading_jumps_and_a_wider_search_w
         let found = (step.update.state, truth.tracked);
         assert_eq!(found, (TrackingState::Tracking, Some(true)), "step {}", step.step);
     }
-    // More patience alone does not bring it back: where it is looked for, it is not.
+    // More retries alone do not find the target again: it is outside the search window.
     assert!(run(&["n_retry=50"])[3].update.state.is_lost());
 }
 
 #[tokio::test]
-async fn the_first_start_begins_one_session_with_a_target_at_the_first_stop() {
+async fn the_first_start_creates_one_session_with_a_target() {
     let folder = tempfile::tempdir().unwrap();
     let scenario = first_session::scenario().unwrap();
     drop(create_simulated(&scenario, &folder.path().join("drive")).unwrap());
@@ -200,7 +200,7 @@ async fn the_first_start_begins_one_session_with_a_target_at_the_first_stop() {
     };
     assert_eq!(view["cursor"], json!({ "target": 0, "run": 0, "step": 0 }));
     assert_eq!(view["targets"][0]["designation"]["step"], 0);
-    // Begun again, there is still one session.
+    // On a second start there is still one session.
     first_session::begin(&server.state, &scenario).unwrap();
     assert_eq!(server.get("sessions").await.expect(200).as_array().unwrap().len(), 1);
     let stop = json!({});
@@ -208,7 +208,7 @@ async fn the_first_start_begins_one_session_with_a_target_at_the_first_stop() {
 }
 
 #[test]
-fn targets_in_good_places_are_kept_more_often_than_in_bad_ones() {
+fn targets_at_good_pixels_survive_more_often() {
     let folder = tempfile::tempdir().unwrap();
     let traverse = create_simulated(&short_approach(), folder.path()).unwrap();
     for step in 0..traverse.stop_count() {
@@ -231,13 +231,13 @@ fn targets_in_good_places_are_kept_more_often_than_in_bad_ones() {
     let [good, risky, bad] = Verdict::ALL.map(|verdict| table.verdict(verdict));
     assert!(good.targets >= 20 && bad.targets >= 20, "{table:?}");
     assert_eq!(good.refused, 0, "a good place can be designated");
-    // The share of good places kept is above that of poor ones by more than 2.5 standard errors, and not significantly below
-    // that of risky ones: in one world these two differ by less than 40 targets of each can tell.
+    // The share of good places tracked to the end exceeds that of poor ones by more than 2.5 standard errors, and is not
+    // significantly below that of risky ones: less than 40 targets of each cannot separate these two in one world.
     assert!(z_score(good, bad) > 2.5, "{table:?}");
     assert!(z_score(good, risky) > -2.0, "{table:?}");
 }
 
-/// Difference of two shares kept in standard errors of that difference (two-proportion z test, pooled).
+/// Difference of two shares in standard errors of that difference (two-proportion z test, pooled).
 fn z_score(first: Counts, second: Counts) -> f64 {
     let [n, m] = [first, second].map(|counts| counts.targets.max(1) as f64);
     let pooled = (first.kept + second.kept) as f64 / (n + m);

@@ -1,5 +1,5 @@
-//! Recordings that a page sends: a folder file by file, or a zip archive, and refused where names leave the folder or there is
-//! too much.
+//! Recordings that a page sends: a folder file by file, or a zip archive; refused if names leave the folder or a limit is
+//! exceeded.
 
 use std::io::{Cursor, Write};
 use std::path::Path;
@@ -54,7 +54,7 @@ async fn contents(server: &TestServer, upload: &Value) -> Answer {
     server.get(&format!("recordings/contents?path={}", escaped(path))).await
 }
 
-/// Imports what an upload contains; the view of its drive.
+/// Imports the contents of an upload; returns the view of its drive.
 async fn import(server: &TestServer, upload: &Value) -> Value {
     let view = contents(server, upload).await.expect(200);
     let job = server.post("imports", &json!({ "path": view["path"] })).await.expect(202);
@@ -63,7 +63,7 @@ async fn import(server: &TestServer, upload: &Value) -> Value {
     server.get(&format!("traverses/{}", job["traverse"].as_str().unwrap())).await.expect(200)
 }
 
-/// The files below a folder with their paths in it.
+/// The files below a folder, with their relative paths.
 fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let mut waiting = vec![folder.to_owned()];
     let mut found = Vec::new();
@@ -90,8 +90,8 @@ fn archive(files: &[(String, Vec<u8>)]) -> Vec<u8> {
     archive.finish().unwrap().into_inner()
 }
 
-/// The entries of the folder in which uploads are kept.
-fn kept(folder: &TempDir) -> usize {
+/// The number of entries in the folder of uploads.
+fn file_count(folder: &TempDir) -> usize {
     std::fs::read_dir(folder.path().join("uploads")).unwrap().count()
 }
 
@@ -107,7 +107,7 @@ async fn a_folder_is_sent_file_by_file_examined_and_imported() {
     assert_eq!((&view["format"], &view["stop_count"]), (&json!("KITTI odometry"), &json!(3)));
     assert_eq!(view["pairs"][0]["right"], json!("image_1/000000.png"));
     let traverse = import(&server, &upload).await;
-    assert_eq!((&traverse["name"], kept(&folder)), (&json!("drive"), 0), "what was sent is imported");
+    assert_eq!((&traverse["name"], file_count(&folder)), (&json!("drive"), 0), "what was sent is imported");
     server
         .json(Method::DELETE, &format!("uploads/{}", upload["id"].as_str().unwrap()), &json!({}))
         .await
@@ -128,14 +128,14 @@ async fn an_archive_is_unpacked_examined_and_imported() {
         let bytes: usize = all.iter().map(|(_, bytes)| bytes.len()).sum();
         assert_eq!((&sent["files"], &sent["bytes"]), (&json!(all.len()), &json!(bytes)));
         let traverse = import(&server, &upload).await;
-        assert_eq!((traverse["stops"].as_array().unwrap().len(), kept(&folder)), (stop_count, 0));
+        assert_eq!((traverse["stops"].as_array().unwrap().len(), file_count(&folder)), (stop_count, 0));
         let source = traverse["source"].as_str().unwrap();
         assert!(Path::new(source).starts_with(folder.path().join("imported")), "{source}");
     }
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn no_file_is_kept_outside_of_its_upload() {
+async fn no_file_is_stored_outside_its_upload() {
     let (server, folder) = server(&[]);
     let upload = begin(&server).await;
     for name in ["", "../x", "a/../../x", "/etc/x", "a\\x", "c:x", "a\0x", ".archive.zip"] {
@@ -166,14 +166,14 @@ async fn too_much_is_refused_with_the_limit_and_how_to_raise_it() {
     let refused = server.post("uploads", &json!({})).await;
     assert!(refused.json()["hint"].as_str().unwrap().contains("--limit uploads=2"));
     refused.problem(409, "conflict");
-    // 100 kB that are a few hundred bytes in the archive: a header may say anything.
+    // 100 kB that are a few hundred bytes in the archive: the sizes in its headers cannot be trusted.
     let bomb = archive(&[("drive/a".to_owned(), vec![0; 100_000])]);
     assert!(bomb.len() < 20_000);
     let refused = send_archive(&server, &upload, bomb).await;
     assert!(refused.json()["hint"].as_str().unwrap().contains("--limit upload_bytes=40000"));
     refused.problem(413, "too_large");
     server.json(Method::DELETE, "uploads/upload-1", &json!({})).await;
-    assert_eq!(kept(&folder), 0);
+    assert_eq!(file_count(&folder), 0);
 
     let upload = begin(&server).await;
     let three = ["a", "b", "c"].map(|name| (name.to_owned(), vec![1]));
@@ -188,7 +188,7 @@ async fn too_much_is_refused_with_the_limit_and_how_to_raise_it() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_is_no_archive_or_no_recording_is_refused_in_one_sentence() {
+async fn files_without_a_recording_are_rejected() {
     let (server, _folder) = server(&[]);
     let upload = begin(&server).await;
     let sentence = contents(&server, &upload).await.problem(422, "file");

@@ -1,4 +1,4 @@
-//! Drives to several targets by REST: the same visits as by the command line, kept over a restart; a fault injected into a branch.
+//! Drives to several targets by REST: the visits equal those of the command line and survive a restart; an injected fault.
 
 use std::path::Path;
 use std::process::Command;
@@ -27,7 +27,7 @@ fn visits_by_command_line(drive: &Path, targets: &[Pixel]) -> Value {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn targets_are_visited_in_turn_as_by_the_command_line_and_a_fault_drops_one() {
+async fn rest_visits_targets_in_turn_like_the_command_line() {
     let (drive, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let path = drive.path().join("drive");
     create_simulated(&several_targets(), &path).unwrap();
@@ -75,7 +75,7 @@ async fn targets_are_visited_in_turn_as_by_the_command_line_and_a_fault_drops_on
     assert_eq!(branched["faults"][0]["kind"], "occluder");
     assert_eq!(driven["cycles"][0], branched["cycles"][0], "the stops before are shared");
 
-    // From a stop before the rover was sent to it, the second target is approached from the place of its designation.
+    // In a branch from a stop before the visit, the approach to the second target counts from its designation.
     let begin = format!("sessions/{session}/targets/1/runs/0/drive");
     let early = json!({ "command": { "tolerance_m": 0.02, "stops_max": 4 }, "from_step": 2 });
     let early = server.post(&begin, &early).await.expect(201)["id"].as_str().unwrap().to_owned();

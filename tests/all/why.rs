@@ -1,4 +1,4 @@
-//! Why, what if, what would have saved it, and runs as a tree, over HTTP.
+//! Why, what if, what would have saved it, and the tree of runs, over HTTP.
 
 use std::time::{Duration, Instant};
 
@@ -39,7 +39,7 @@ impl Fixture {
         self.server.ended(&self.session, 0, run).await
     }
 
-    /// A run that loses the target at step 2, because its limit is too strict.
+    /// A run that loses the target at step 2 because of a strict limit.
     async fn lost(&self) -> Value {
         let run = self.fork(&json!({ "run": 0, "from_step": 2, "settings": { "ncc_min": 0.9999 } })).await;
         assert_eq!(run["rows"][2]["state"], json!("lost"), "{run}");
@@ -50,7 +50,7 @@ impl Fixture {
         self.server.get(&format!("sessions/{}", self.session)).await.expect(200)
     }
 
-    /// The answer to what would have saved a step.
+    /// Waits for the answer to a counterfactual question about a step.
     async fn answered(&self, path: &str) -> Value {
         let begun = Instant::now();
         loop {
@@ -63,7 +63,7 @@ impl Fixture {
         }
     }
 
-    /// The same folders in a server that was started again.
+    /// Restarts the server with the same folders.
     async fn restarted(self) -> Self {
         let Self { drive, folder, server, session } = self;
         drop(server);
@@ -74,7 +74,7 @@ impl Fixture {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_step_can_be_tried_with_other_settings_and_nothing_is_stored() {
+async fn trying_a_step_with_other_settings_stores_nothing() {
     let fixture = Fixture::new().await;
     let before = fixture.view().await;
     let path = format!("{}/what_if", fixture.step(0, 2));
@@ -96,14 +96,14 @@ async fn a_step_can_be_tried_with_other_settings_and_nothing_is_stored() {
     let put = json!({ "x": predicted["x"].as_f64().unwrap() + 12.5, "y": predicted["y"] });
     let moved = fixture.server.post(&path, &json!({ "prediction_px": put })).await.expect(200);
     for axis in ["x", "y"] {
-        let (shown, asked) = (moved["predicted_left"][axis].as_f64(), put[axis].as_f64());
-        assert!((shown.unwrap() - asked.unwrap()).abs() < 1e-6, "{moved}");
+        let (shown, requested) = (moved["predicted_left"][axis].as_f64(), put[axis].as_f64());
+        assert!((shown.unwrap() - requested.unwrap()).abs() < 1e-6, "{moved}");
     }
     assert_eq!(fixture.view().await, before, "trying changes nothing");
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_cannot_be_tried_is_refused_in_one_sentence() {
+async fn invalid_trials_are_rejected_in_one_sentence() {
     let fixture = Fixture::new().await;
     let path = format!("{}/what_if", fixture.step(0, 2));
     for (body, code, names) in [
@@ -133,7 +133,7 @@ async fn what_cannot_be_tried_is_refused_in_one_sentence() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_branch_with_a_displaced_prediction_has_the_same_bits_after_a_restart() {
+async fn a_displaced_branch_has_the_same_bits_after_a_restart() {
     let fixture = Fixture::new().await;
     let same = fixture.server.post(&format!("{}/what_if", fixture.step(0, 2)), &json!({})).await.expect(200);
     let put = json!({ "x": same["predicted_left"]["x"].as_f64().unwrap() - 9.0,
@@ -154,7 +154,7 @@ async fn a_branch_with_a_displaced_prediction_has_the_same_bits_after_a_restart(
         }
         traces
     };
-    // Run again from the very step, the branch of the branch is displaced alike.
+    // A fork at the same step displaces the prediction as its parent did.
     let again = fixture.fork(&json!({ "run": 1, "from_step": 2 })).await;
     assert_eq!((&again["rows"], &again["fork"]["prediction_px"]), (&branch["rows"], &put));
     let fixture = fixture.restarted().await;
@@ -169,16 +169,16 @@ async fn a_branch_with_a_displaced_prediction_has_the_same_bits_after_a_restart(
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_would_have_saved_a_step_is_a_job_that_answers_with_verified_changes() {
+async fn counterfactual_answers_are_verified_changes() {
     let fixture = Fixture::new().await;
     let lost = fixture.lost().await;
     let path = format!("{}/counterfactual", fixture.step(1, 2));
     assert_eq!(fixture.server.get(&path).await.expect(200)["state"], json!("unasked"));
     let nowhere = format!("{}/counterfactual", fixture.step(1, 99));
     fixture.server.get(&nowhere).await.problem(404, "not_found");
-    let asked = fixture.server.post(&path, &json!({})).await;
-    assert_eq!(asked.headers[header::LOCATION], format!("/api/v1/{path}"));
-    assert_eq!(asked.expect(202)["step"], json!(2));
+    let requested = fixture.server.post(&path, &json!({})).await;
+    assert_eq!(requested.headers[header::LOCATION], format!("/api/v1/{path}"));
+    assert_eq!(requested.expect(202)["step"], json!(2));
     let question = fixture.answered(&path).await;
     assert_eq!(question["state"], json!("done"), "{question}");
     let answer = &question["answer"];
@@ -189,14 +189,14 @@ async fn what_would_have_saved_a_step_is_a_job_that_answers_with_verified_change
     let to = by_limit["changes"][0]["to"].as_f64().unwrap();
     assert!(to <= ncc && ncc - to <= 0.1 * (0.9999 - ncc), "{to} for {ncc}");
     assert_eq!(by_limit["outcome"], json!("right"));
-    // What it promises is what a try of it gives, and a branch of it.
+    // A what-if with the change, and a branch, give the promised result.
     let changes = json!({ "ncc_min": to });
     let tried = json!({ "settings": changes });
     let tried = fixture.server.post(&format!("{}/what_if", fixture.step(1, 2)), &tried).await.expect(200);
     assert_eq!(tried["row"], by_limit["row"]);
     let branch = fixture.fork(&json!({ "run": 1, "from_step": 2, "settings": changes })).await;
     assert_eq!(branch["rows"][2], by_limit["row"]);
-    // Asked again it is answered already.
+    // A repeated question has its answer already.
     assert_eq!(fixture.server.post(&path, &json!({})).await.expect(202), question);
     fixture.server.post(&format!("{path}/cancel"), &json!({})).await.problem(409, "conflict");
     let fine = format!("{}/counterfactual", fixture.step(0, 2));
@@ -205,7 +205,7 @@ async fn what_would_have_saved_a_step_is_a_job_that_answers_with_verified_change
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_cancelled_question_stops_at_once_and_keeps_what_was_found() {
+async fn a_cancelled_question_keeps_its_findings() {
     let fixture = Fixture::new().await;
     fixture.lost().await;
     let path = format!("{}/counterfactual", fixture.step(1, 2));
@@ -215,13 +215,13 @@ async fn a_cancelled_question_stops_at_once_and_keeps_what_was_found() {
     let found = cancelled["answer"].clone();
     tokio::time::sleep(Duration::from_millis(200)).await;
     assert_eq!(fixture.server.get(&path).await.expect(200)["answer"], found, "nothing is found after it");
-    // It can be asked anew.
+    // It can be asked again.
     assert_ne!(fixture.server.post(&path, &json!({})).await.expect(202)["state"], json!("cancelled"));
     assert_eq!(fixture.answered(&path).await["state"], json!("done"));
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_value_leads_to_its_inputs_its_file_and_its_pose() {
+async fn a_value_links_to_its_inputs_file_and_pose() {
     let fixture = Fixture::new().await;
     fixture.lost().await;
     let path = format!("{}/why", fixture.step(1, 2));
@@ -248,7 +248,7 @@ async fn a_value_leads_to_its_inputs_its_file_and_its_pose() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn removed_runs_and_targets_come_back_and_what_left_them_stays() {
+async fn removed_runs_and_targets_can_be_restored() {
     let fixture = Fixture::new().await;
     let child = fixture.fork(&json!({ "run": 0, "from_step": 2, "settings": { "focus_px": 0.0 } })).await;
     let remove = |path: String| {
@@ -265,7 +265,7 @@ async fn removed_runs_and_targets_come_back_and_what_left_them_stays() {
     assert_eq!(numbers, [1]);
     fixture.server.get(&fixture.step(0, 1)).await.problem(404, "not_found");
     remove(format!("{}/0", fixture.runs())).await.problem(404, "not_found");
-    // The last one stays: its target is removed instead.
+    // The last run stays: its target is removed instead.
     let sentence = remove(format!("{}/1", fixture.runs())).await.problem(422, "request");
     assert!(sentence.contains("remove the target instead"), "{sentence}");
     let fixture = fixture.restarted().await;

@@ -1,7 +1,7 @@
-//! Correlation scores on real images against OpenCV, and against K-Eq 11 in double precision (R62, R63, R66).
+//! Correlation scores on real images, compared with OpenCV and with K-Eq 11 in double precision (R62, R63, R66).
 //!
-//! `tests/reference/zncc_reference.py` wrote the numbers and says how. The images are not part of the project:
-//! cases whose data set is missing are named and left out (`sightline_tests::data`).
+//! `tests/reference/zncc_reference.py` wrote the numbers and describes the method. The images are not part of the project:
+//! cases whose data set is missing are listed and skipped (`sightline_tests::data`).
 
 #![allow(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
@@ -18,7 +18,7 @@ use sightline_vision::image::{GrayImage, io};
 /// OpenCV sums in single precision.
 const OPENCV_TOLERANCE: f64 = 1e-4;
 
-/// What `zncc_surface` promises.
+/// The accuracy that `zncc_surface` documents.
 const EXACT_TOLERANCE: f64 = 1e-5;
 
 fn workspace() -> PathBuf {
@@ -60,7 +60,7 @@ fn integers<const N: usize>(value: &Value) -> [i32; N] {
     std::array::from_fn(|i| value[i].as_i64().unwrap() as i32)
 }
 
-/// Compares one case; gives the largest differences from OpenCV and from double precision.
+/// Compares one case; returns the largest differences from OpenCV and from double precision.
 fn compare(case: &Value, template_source: &GrayImage, image: &GrayImage) -> (f64, f64) {
     let name = case["name"].as_str().unwrap();
     let [x, y] = integers(&case["template_centre"]).map(f64::from);
@@ -94,7 +94,7 @@ fn compare(case: &Value, template_source: &GrayImage, image: &GrayImage) -> (f64
 }
 
 #[test]
-fn scores_on_real_images_equal_those_of_opencv_and_of_the_formula() {
+fn scores_on_real_images_equal_opencv_and_the_formula() {
     let text = std::fs::read_to_string(workspace().join("tests/reference/zncc_reference.json")).unwrap();
     let document: Value = serde_json::from_str(&text).unwrap();
     for case in document["cases"].as_array().unwrap() {

@@ -108,7 +108,7 @@ def row(pair, images, truth, name, count):
 
 
 def street(name, count=96):
-    """As `a_street_is_consistent_from_eye_to_eye_and_from_frame_to_frame` does with ours."""
+    """As `street_stereo_is_consistent_between_eyes_and_frames` does with ours."""
     folder, matcher = DATA / "kitti-seq1-frames-0-19", MATCHERS[name](count)
     lines = (line.split(":") for line in open(folder / "calib.txt"))
     cameras = {key: np.array(values.split(), float).reshape(3, 4) for key, values in lines}

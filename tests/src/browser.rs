@@ -1,10 +1,10 @@
-//! A browser for the tests: Chromium without a window, painting WebGL in software, driven through chromedriver.
+//! A browser for the tests: headless Chromium with software WebGL, controlled through chromedriver.
 //!
-//! `cargo xtask test` installs both programs and names them in `SIGHTLINE_CHROMIUM` and `SIGHTLINE_CHROMEDRIVER`;
-//! without these variables they are looked for in `PATH`. Every [`Browser`] has a driver, a profile and a port of its
-//! own, so tests may run side by side, and nothing outlives it.
+//! `cargo xtask test` installs both programs and sets `SIGHTLINE_CHROMIUM` and `SIGHTLINE_CHROMEDRIVER`; without these
+//! variables they are searched in `PATH`. Every [`Browser`] has its own driver, profile and port, so that tests can run in
+//! parallel, and ends both processes when it is dropped.
 //!
-//! A step that fails is a panic with a sentence: this is code of tests, and there is nothing to recover.
+//! A failed step panics with a message.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -22,12 +22,12 @@ use hyper_util::client::legacy::connect::HttpConnector;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-use crate::processes::{self, Taken};
+use crate::processes::{self, ResourceUse};
 
 /// The id of the canvas on which the viewer paints.
 const CANVAS: &str = "sightline";
 
-/// How long a page may take to come to the state that a test waits for; painting in software is slow.
+/// Maximum time for a page to reach a state; painting in software is slow.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A running Chromium.
@@ -55,23 +55,23 @@ impl Browser {
         Self { client, driver }
     }
 
-    /// Opens a page and returns when the browser has loaded it; the viewer may still be on its way.
+    /// Opens a page and returns once the browser has loaded it; the viewer may still be starting.
     pub async fn goto(&self, url: &str) {
         self.client.goto(url).await.unwrap_or_else(|error| panic!("{url} cannot be opened: {error}"));
     }
 
-    /// Waits until the page has taken away its loading message, which it does when the viewer runs.
+    /// Waits until the page has removed its loading message, which means that the viewer runs.
     ///
     /// # Panics
-    /// With what the page says, when the viewer cannot start.
+    /// With the message of the page if the viewer cannot start.
     pub async fn wait_for_viewer(&self) {
         let script = "const message = document.getElementById('message'); \
                       return message.hidden || message.classList.contains('failed')";
         self.wait_for("the viewer to start", script).await;
-        let said = self
+        let failure = self
             .evaluate("const m = document.getElementById('message'); return m.hidden ? null : m.innerText")
             .await;
-        assert!(said.is_null(), "the viewer did not start; the page says: {said}");
+        assert!(failure.is_null(), "the viewer did not start; the page says: {failure}");
     }
 
     /// Waits until a script such as `return document.title === "ready"` gives a true value.
@@ -95,14 +95,14 @@ impl Browser {
             .unwrap_or_else(|error| panic!("the script `{script}` failed: {error}"))
     }
 
-    /// Moves the pointer to a place on the canvas, in CSS pixels from its upper left corner.
+    /// Moves the pointer to a position on the canvas, in CSS pixels from its upper left corner.
     pub async fn point_at(&self, x: f64, y: f64) {
         self.act(x, y, &[]).await;
     }
 
-    /// Clicks with the left button at a place on the canvas, in CSS pixels from its upper left corner.
+    /// Clicks with the left button at a position on the canvas, in CSS pixels from its upper left corner.
     pub async fn click(&self, x: f64, y: f64) {
-        // The browser cuts fractions of a pixel off.
+        // The browser truncates fractions of a pixel.
         let (x, y) = (x.round(), y.round());
         let pause = PointerAction::Pause { duration: Duration::from_millis(50) };
         let down = PointerAction::Down { button: MOUSE_BUTTON_LEFT };
@@ -115,7 +115,7 @@ impl Browser {
         self.chord(&[], key).await;
     }
 
-    /// Presses a key while others are held: `["Control"], "k"`.
+    /// Presses a key while others are down: `["Control"], "k"`.
     pub async fn chord(&self, held: &[&str], key: &str) {
         let down = held.iter().chain([&key]).map(|key| KeyAction::Down { value: key_value(key) });
         let up =
@@ -123,13 +123,13 @@ impl Browser {
         self.type_actions(down.chain(up), key).await;
     }
 
-    /// Holds a key down until [`Self::let_go`].
-    pub async fn hold(&self, key: &str) {
+    /// Holds a key down until [`Self::key_up`].
+    pub async fn key_down(&self, key: &str) {
         self.type_actions([KeyAction::Down { value: key_value(key) }], key).await;
     }
 
-    /// Lets a held key go.
-    pub async fn let_go(&self, key: &str) {
+    /// Releases a key.
+    pub async fn key_up(&self, key: &str) {
         self.type_actions([KeyAction::Up { value: key_value(key) }], key).await;
     }
 
@@ -146,7 +146,7 @@ impl Browser {
         }
     }
 
-    /// Drags with the left button from one place on the canvas to another, CSS px.
+    /// Drags with the left button from one position on the canvas to another, CSS px.
     pub async fn drag(&self, from: (f64, f64), to: (f64, f64)) {
         let pause = PointerAction::Pause { duration: Duration::from_millis(60) };
         let mut rest = vec![PointerAction::Down { button: MOUSE_BUTTON_LEFT }, pause.clone()];
@@ -160,7 +160,7 @@ impl Browser {
         self.act(from.0.round(), from.1.round(), &rest).await;
     }
 
-    /// Asks the browser itself, which computes it as for a screen reader: role and name of an element.
+    /// Returns role and name of an element as the browser computes them for a screen reader.
     pub async fn computed(&self, selector: &str) -> (String, String) {
         let element = self.client.find(fantoccini::Locator::Css(selector)).await;
         let element = element.unwrap_or_else(|error| panic!("nothing is {selector}: {error}"));
@@ -175,8 +175,8 @@ impl Browser {
         (answers.pop().unwrap_or_default(), name)
     }
 
-    /// Gives the page this size, px. The browser's own bars differ from version to version, so that the size of the window
-    /// does not tell the page's; and the page follows its window a moment later, so that both are read until they agree.
+    /// Resizes the page, px. The height of the browser's own bars varies with its version, and the page follows its window
+    /// with a delay; the size of the page is therefore read until it is the requested one.
     pub async fn resize(&self, width: u32, height: u32) {
         let wanted = [i64::from(width), i64::from(height)];
         let mut window = wanted;
@@ -199,7 +199,7 @@ impl Browser {
         panic!("the page does not take the size {width} × {height}");
     }
 
-    /// Drops a file or folder of this machine on the middle of the page, as a person does with the mouse.
+    /// Drops a file or folder of this machine on the middle of the page, like a user with the mouse.
     pub async fn drop_path(&self, path: &std::path::Path) {
         let size = self.evaluate("return [innerWidth / 2, innerHeight / 2]").await;
         let path = std::fs::canonicalize(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
@@ -211,12 +211,12 @@ impl Browser {
         }
     }
 
-    /// The page as it looks now, as a PNG file's bytes.
+    /// A screenshot of the page, PNG.
     pub async fn screenshot(&self) -> Vec<u8> {
         self.client.screenshot().await.unwrap_or_else(|error| panic!("the page cannot be pictured: {error}"))
     }
 
-    /// The errors that the console has received since the last call.
+    /// The errors written to the console since the last call.
     pub async fn console_errors(&self) -> Vec<String> {
         let entries = self
             .client
@@ -227,19 +227,19 @@ impl Browser {
         errors.map(|entry| entry["message"].as_str().unwrap_or_default().to_owned()).collect()
     }
 
-    /// What the browser's processes have taken so far; none where the system does not tell.
-    pub fn taken(&self) -> Option<Taken> {
-        processes::taken(self.driver.browser?)
+    /// Resources used by the browser's processes so far; `None` where the system does not report them.
+    pub fn resource_use(&self) -> Option<ResourceUse> {
+        processes::resource_use(self.driver.browser?)
     }
 
-    /// Ends the browser; dropping it does the same, less politely.
+    /// Ends the browser in an orderly way; dropping it also ends it.
     pub async fn close(self) {
         let Self { client, driver } = self;
         client.close().await.unwrap_or_else(|error| panic!("the browser cannot be closed: {error}"));
         drop(driver);
     }
 
-    /// Moves the pointer to a place on the canvas and does the rest there.
+    /// Moves the pointer to a position on the canvas and performs `rest` there.
     async fn act(&self, x: f64, y: f64, rest: &[PointerAction]) {
         let script = format!(
             "const r = document.getElementById('{CANVAS}').getBoundingClientRect(); return [r.left, r.top]"
@@ -259,7 +259,7 @@ impl Browser {
 /// A running chromedriver with the profile of its browser.
 struct Driver {
     process: Child,
-    /// The browser's process, once there is one.
+    /// Process id of the browser, once it is started.
     browser: Option<u64>,
     port: u16,
     profile: TempDir,
@@ -283,14 +283,14 @@ impl Driver {
             let number = line.split("successfully on port ").nth(1)?;
             number.trim_end_matches('.').parse().ok()
         });
-        // The driver stops when it cannot write, so what it says later is read and forgotten.
+        // The driver stops when it cannot write, so its further output is read and discarded.
         std::thread::spawn(move || lines.for_each(drop));
         let port =
             port.unwrap_or_else(|| panic!("{} says no port and has probably ended", program.display()));
         Self { process, browser: None, port, profile }
     }
 
-    /// Asks the driver to end its browser and itself.
+    /// Tells the driver to end its browser and itself.
     fn shut_down(&self) -> std::io::Result<()> {
         let mut stream = TcpStream::connect(("127.0.0.1", self.port))?;
         stream.set_read_timeout(Some(Duration::from_secs(5)))?;
@@ -306,7 +306,7 @@ impl Driver {
 impl Drop for Driver {
     fn drop(&mut self) {
         if let (Err(_), Some(browser)) = (self.shut_down(), self.browser) {
-            // A driver that does not answer leaves its browser behind; one that is gone already needs no signal.
+            // A driver that does not answer leaves its browser running; if it has ended, the kill has no effect.
             Command::new("kill")
                 .arg(browser.to_string())
                 .stderr(Stdio::null())
@@ -323,7 +323,7 @@ impl Drop for Driver {
     }
 }
 
-/// Chromedriver's own command for what the console received.
+/// Chromedriver's own command that returns the console log.
 #[derive(Debug)]
 struct ConsoleLog;
 
@@ -337,7 +337,7 @@ impl WebDriverCompatibleCommand for ConsoleLog {
     }
 }
 
-/// Chromedriver's command for the browser's own tools.
+/// Chromedriver's command that calls the developer tools.
 #[derive(Debug)]
 struct DevTools {
     command: &'static str,
@@ -355,7 +355,7 @@ impl WebDriverCompatibleCommand for DevTools {
     }
 }
 
-/// WebDriver's question for what the browser tells assistive programs of an element.
+/// The WebDriver command for the accessible role or name of an element.
 #[derive(Debug)]
 struct Computed {
     element: String,
@@ -373,7 +373,7 @@ impl WebDriverCompatibleCommand for Computed {
     }
 }
 
-/// A program of the browser, from its variable or from `PATH`.
+/// The path of a browser program, from its variable or from `PATH`.
 fn program(variable: &str, names: &[&str]) -> PathBuf {
     let named = std::env::var_os(variable).map(PathBuf::from);
     let path = std::env::var_os("PATH").unwrap_or_default();
@@ -387,7 +387,7 @@ fn program(variable: &str, names: &[&str]) -> PathBuf {
     })
 }
 
-/// How the browser starts: no window, no sandbox (the tests also run as root), WebGL in software, nothing fetched.
+/// Capabilities of the browser: headless, without sandbox (the tests also run as root), software WebGL, no network fetches.
 fn capabilities(chromium: &std::path::Path, profile: &TempDir) -> Capabilities {
     let mut arguments: Vec<String> = [
         "--headless=new",
@@ -414,7 +414,7 @@ fn capabilities(chromium: &std::path::Path, profile: &TempDir) -> Capabilities {
     all.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
 }
 
-/// The character with which the protocol names a key.
+/// The character that encodes a key in the WebDriver protocol.
 fn key_value(key: &str) -> char {
     let named = match key {
         "ArrowLeft" => Key::Left,

@@ -1,7 +1,7 @@
-//! The page as a screen reader finds it: controls by role and name, from the elements that mirror what is painted.
+//! The page as a screen reader reads it: controls by role and name, from the elements that mirror the painted page.
 //!
-//! A control is clicked with the pointer where it is painted, as a person would; what a screen reader does instead, an
-//! action on the element itself, is [`Browser::activate`].
+//! A control is clicked with the pointer at its painted position, like by a user; [`Browser::activate`] instead acts on the
+//! element, like a screen reader.
 
 use std::time::{Duration, Instant};
 
@@ -10,13 +10,13 @@ use serde_json::Value;
 
 use crate::browser::Browser;
 
-/// How long a control may take to come.
+/// Maximum time until a control appears.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// How long what is rendered or tracked on a busy machine may take to come.
+/// Maximum time for something that is rendered or tracked on a busy machine.
 const LONG_PATIENCE: Duration = Duration::from_secs(300);
 
-/// Waits for three painted frames: a window that grew is moved in the frame after.
+/// Waits for three painted frames: a window that has grown is moved in the next frame.
 const FRAMES: &str = "return new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => \
     requestAnimationFrame(() => done(null)))))";
 
@@ -31,7 +31,7 @@ const LIST: &str = "return [...document.querySelectorAll('#sightline-mirror [dat
         disabled: e.getAttribute('aria-disabled') === 'true', \
         region: e.parentElement?.closest('[role=region],[role=dialog]')?.getAttribute('aria-label') ?? ''}; })";
 
-/// A control or a text.
+/// A control or a text of the page.
 #[derive(Clone, Debug, Deserialize, PartialEq)]
 pub struct Control {
     /// The element's id.
@@ -40,42 +40,42 @@ pub struct Control {
     pub role: String,
     /// Accessible name.
     pub name: String,
-    /// The words of a text, the contents of a field.
+    /// The words of a text, or the contents of a field.
     pub value: String,
     /// Left, top, width, height, CSS px.
     pub rect: [f64; 4],
-    /// Whether it is pressed, checked or selected.
+    /// Whether the control is pressed, checked or selected.
     pub on: bool,
-    /// Whether it does nothing at the moment.
+    /// Whether the control is disabled.
     pub disabled: bool,
-    /// The panel or dialog in which it lies.
+    /// The panel or dialog that contains the control.
     pub region: String,
 }
 
 impl Control {
-    /// Its middle, CSS px.
-    pub fn middle(&self) -> (f64, f64) {
+    /// The centre of the control, CSS px.
+    pub fn centre(&self) -> (f64, f64) {
         let [x, y, width, height] = self.rect;
         (x + width / 2.0, y + height / 2.0)
     }
 }
 
 impl Browser {
-    /// Waits until three frames were painted.
+    /// Waits until three frames have been painted.
     pub async fn frames(&self) {
         self.evaluate(FRAMES).await;
     }
 
-    /// Everything on the page, in reading order.
+    /// All elements of the page, in reading order.
     pub async fn controls(&self) -> Vec<Control> {
         let list = self.evaluate(LIST).await;
         serde_json::from_value(list).unwrap_or_else(|error| panic!("the list of controls: {error}"))
     }
 
-    /// The control of a role whose name is or begins with `name`; waits until there is one.
+    /// Returns the control of a role whose name is or begins with `name`; waits until it exists.
     ///
     /// # Panics
-    /// With the names of that role's controls, when none comes.
+    /// With the names of all controls of that role, if it does not appear.
     pub async fn control(&self, role: &str, name: &str) -> Control {
         let start = Instant::now();
         loop {
@@ -87,7 +87,7 @@ impl Browser {
                 return control.clone();
             }
             if start.elapsed() > PATIENCE {
-                self.shot("missing").await;
+                self.save_screenshot("missing").await;
                 let names: Vec<&str> = of_role().map(|control| control.name.as_str()).collect();
                 panic!("there is no {role} “{name}”, but {names:?}");
             }
@@ -95,31 +95,31 @@ impl Browser {
         }
     }
 
-    /// Whether there is such a control now.
+    /// Whether such a control exists.
     pub async fn has_control(&self, role: &str, name: &str) -> bool {
         self.controls().await.iter().any(|control| control.role == role && control.name.starts_with(name))
     }
 
-    /// Waits until there is no such control any more: a window above the panels that has closed lets clicks through.
+    /// Waits until no such control exists: a closing window above the panels still catches clicks.
     ///
     /// # Panics
-    /// When it stays.
-    pub async fn gone(&self, role: &str, name: &str) {
+    /// If it remains.
+    pub async fn wait_until_gone(&self, role: &str, name: &str) {
         let start = Instant::now();
         while self.has_control(role, name).await {
             if start.elapsed() > PATIENCE {
-                self.shot("stays").await;
+                self.save_screenshot("stays").await;
                 panic!("{role} “{name}” stays");
             }
             tokio::time::sleep(Duration::from_millis(50)).await;
         }
     }
 
-    /// Clicks a control with the pointer, in its middle, once it can be clicked and has come to rest: windows find their size
-    /// within a few frames, which a busy machine paints late.
+    /// Clicks the centre of a control with the pointer, once it is enabled and has stopped moving: windows reach their final
+    /// size within a few frames, which a busy machine paints late.
     ///
     /// # Panics
-    /// When it stays disabled.
+    /// If it remains disabled.
     pub async fn click_on(&self, role: &str, name: &str) {
         let start = Instant::now();
         let mut before = self.control(role, name).await;
@@ -128,7 +128,7 @@ impl Browser {
             self.frames().await;
             let control = self.control(role, name).await;
             if !control.disabled && control.rect == before.rect {
-                let (x, y) = control.middle();
+                let (x, y) = control.centre();
                 return self.click(x, y).await;
             }
             assert!(start.elapsed() < PATIENCE, "{role} “{name}” is disabled, or never at rest");
@@ -136,10 +136,10 @@ impl Browser {
         }
     }
 
-    /// Chooses what an open list calls so; the list of targets calls its runs the same.
+    /// Chooses the entry `name` of an open list; the list of targets has entries of the same names.
     ///
     /// # Panics
-    /// When nothing in the list is called so.
+    /// If the list has no such entry.
     pub async fn choose(&self, name: &str) {
         let start = Instant::now();
         while start.elapsed() < PATIENCE {
@@ -147,7 +147,7 @@ impl Browser {
             let listed =
                 |c: &&Control| c.role == "button" && c.name == name && c.region != "Targets and runs";
             if let Some(control) = all.iter().rfind(listed) {
-                let (x, y) = control.middle();
+                let (x, y) = control.centre();
                 return self.click(x, y).await;
             }
             tokio::time::sleep(Duration::from_millis(100)).await;
@@ -160,13 +160,13 @@ impl Browser {
         self.act_on(role, name, "e.click()").await;
     }
 
-    /// Gives a field or slider a value as a screen reader does, without the pointer.
+    /// Sets the value of a field or slider as a screen reader does, without the pointer.
     pub async fn set_value(&self, role: &str, name: &str, value: &str) {
         let act = format!("e.value = '{value}'; e.dispatchEvent(new Event('input', {{bubbles: true}}))");
         self.act_on(role, name, &act).await;
     }
 
-    /// Does something to a control's element `e`; another element may be in its place since it was found.
+    /// Runs `act` on the element `e` of a control, which is looked up again, because it may have been replaced.
     async fn act_on(&self, role: &str, name: &str, act: &str) {
         let start = Instant::now();
         loop {
@@ -180,11 +180,11 @@ impl Browser {
         }
     }
 
-    /// Waits until a text with these words is on the page.
+    /// Waits until a text that contains these words is on the page.
     ///
     /// # Panics
-    /// With all texts, when it does not come.
-    pub async fn says(&self, words: &str) {
+    /// With all texts, if it does not appear.
+    pub async fn wait_for_text(&self, words: &str) {
         let start = Instant::now();
         loop {
             let all = self.controls().await;
@@ -200,29 +200,29 @@ impl Browser {
         }
     }
 
-    /// What a screen reader was told last.
-    pub async fn spoken(&self) -> String {
+    /// The last announcement to screen readers.
+    pub async fn last_announcement(&self) -> String {
         let text = self.evaluate("return document.getElementById('sightline-status').textContent").await;
         text.as_str().unwrap_or_default().to_owned()
     }
 
-    /// What the page's address says after its `#`.
+    /// The part of the page's address after `#`.
     pub async fn fragment(&self) -> String {
         let hash = self.evaluate("return location.hash").await;
         hash.as_str().unwrap_or_default().trim_start_matches('#').to_owned()
     }
 
-    /// The page's status, as `viewer/src/page/status.rs` describes it.
+    /// The page's status; `viewer/src/page/status.rs` describes it.
     pub async fn status(&self) -> Value {
         let text = self.evaluate("return document.getElementById('sightline').dataset.status || '{}'").await;
         serde_json::from_str(text.as_str().unwrap_or("{}")).unwrap_or_default()
     }
 
-    /// Waits until a condition over the page's status `s` holds; long enough for rendering on a busy machine.
+    /// Waits until a condition on the page's status `s` is true, with enough time for rendering on a busy machine.
     ///
     /// # Panics
-    /// With the status, when it never does.
-    pub async fn wait_status(&self, what: &str, condition: &str) {
+    /// With the status, if the condition never becomes true.
+    pub async fn wait_for_status(&self, what: &str, condition: &str) {
         let script = format!(
             "const s = JSON.parse(document.getElementById('sightline').dataset.status || '{{}}'); return {condition}"
         );
@@ -233,42 +233,42 @@ impl Browser {
             }
             tokio::time::sleep(Duration::from_millis(100)).await;
         }
-        self.shot("waited").await;
+        self.save_screenshot("waited").await;
         panic!("waited {} s for {what}; the page says {}", LONG_PATIENCE.as_secs(), self.status().await);
     }
 
-    /// Goes to a place of the drive as a person writes it, and waits until that step is shown.
+    /// Goes to a place of the drive, written as in the box of G, and waits until that step is shown.
     pub async fn go_to(&self, place: &str, step: usize) {
         self.press("g").await;
         self.control("textbox", "go to step").await;
         self.type_text(place).await;
         self.press("Enter").await;
-        self.gone("textbox", "go to step").await;
-        self.wait_status("the step", &format!("s.step === {step} && s.shown")).await;
+        self.wait_until_gone("textbox", "go to step").await;
+        self.wait_for_status("the step", &format!("s.step === {step} && s.shown")).await;
     }
 
-    /// Brings a panel to the front by the palette.
+    /// Brings a panel to the front through the palette.
     pub async fn show_panel(&self, name: &str) {
         self.chord(&["Control"], "k").await;
         self.control("textbox", "palette").await;
         self.type_text(&format!("show {name}")).await;
         self.control("option", &format!("Show {name}")).await;
         self.press("Enter").await;
-        self.gone("textbox", "palette").await;
+        self.wait_until_gone("textbox", "palette").await;
         self.control("region", name).await;
     }
 
-    /// Ends the browser, which has received no error in its console.
+    /// Asserts that the console has no errors, and ends the browser.
     ///
     /// # Panics
-    /// With the errors, when there are some.
+    /// With the errors, if there are any.
     pub async fn end(self) {
         assert_eq!(self.console_errors().await, Vec::<String>::new());
         self.close().await;
     }
 
-    /// Keeps a picture of the page in the folder that `SIGHTLINE_SHOTS` names, to be looked at.
-    pub async fn shot(&self, name: &str) {
+    /// Saves a screenshot for inspection in the folder that `SIGHTLINE_SHOTS` names.
+    pub async fn save_screenshot(&self, name: &str) {
         if let Some(folder) = std::env::var_os("SIGHTLINE_SHOTS") {
             let folder = std::path::PathBuf::from(folder);
             std::fs::create_dir_all(&folder).expect("the folder of pictures");

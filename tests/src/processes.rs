@@ -1,25 +1,25 @@
-//! What the browser's processes take, read from `/proc`: processor time and memory.
+//! Processor time and memory of the browser's processes, from `/proc`.
 
 use std::collections::HashMap;
 use std::path::Path;
 
-/// What a browser's processes have taken so far.
+/// Resources used by a browser's processes so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Taken {
-    /// Processor time of all of them, s.
+pub struct ResourceUse {
+    /// Total processor time, s.
     pub cpu_s: f64,
     /// Resident memory of the process that runs the page, bytes.
     pub page_bytes: u64,
 }
 
-/// What `root` and its descendants have taken; none where the system has no `/proc`.
-pub(crate) fn taken(root: u64) -> Option<Taken> {
+/// Resources used by `root` and its descendants; `None` where the system has no `/proc`.
+pub(crate) fn resource_use(root: u64) -> Option<ResourceUse> {
     let mut parents: HashMap<u64, u64> = HashMap::new();
     let mut ticks: HashMap<u64, u64> = HashMap::new();
     for entry in std::fs::read_dir("/proc").ok()?.flatten() {
         let Some(id) = entry.file_name().to_str().and_then(|name| name.parse::<u64>().ok()) else { continue };
         let Ok(stat) = std::fs::read_to_string(entry.path().join("stat")) else { continue };
-        // The name stands in brackets and may hold anything.
+        // The name is in parentheses and may contain any character.
         let Some((_, rest)) = stat.rsplit_once(") ") else { continue };
         let fields: Vec<&str> = rest.split(' ').collect();
         let number =
@@ -36,9 +36,9 @@ pub(crate) fn taken(root: u64) -> Option<Taken> {
         }
         false
     };
-    let mut all = Taken::default();
+    let mut all = ResourceUse::default();
     for id in parents.keys().copied().filter(|id| is_ours(*id)) {
-        // A tick of the kernel's clock for programs is a hundredth of a second on every Linux.
+        // A clock tick of user space is 1/100 s on every Linux.
         all.cpu_s += ticks.get(&id).copied().unwrap_or(0) as f64 / 100.0;
         let folder = Path::new("/proc").join(id.to_string());
         let command = std::fs::read(folder.join("cmdline")).unwrap_or_default();

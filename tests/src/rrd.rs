@@ -1,4 +1,4 @@
-//! Reads an `.rrd` file back: which entities it holds, how many rows each has, and what is in them.
+//! Reads an `.rrd` file: its entities, the number of rows of each, and their data.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -14,10 +14,10 @@ use rerun::{ComponentIdentifier, StoreKind};
 /// The component that marks a row as cleared.
 const CLEAR: &str = "Clear:is_recursive";
 
-/// What a file holds of one entity.
+/// The rows of one entity.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct EntityRows {
-    /// Rows outside of all time.
+    /// Number of static rows.
     pub fixed: usize,
     /// Steps of the rows with data, in the order of the file.
     pub data: Vec<i64>,
@@ -31,20 +31,20 @@ pub struct EntityRows {
     pub numbers: BTreeMap<(String, i64), Vec<f64>>,
 }
 
-/// What a file holds.
+/// The contents of a file.
 #[derive(Clone, Debug, Default)]
 pub struct Recording {
-    /// Its application, by which a viewer keeps layouts apart.
+    /// Application id, by which a viewer stores its layouts.
     pub application: String,
     /// The entities of the recording, by path.
     pub entities: BTreeMap<String, EntityRows>,
     /// The entities of the layout.
     pub blueprint: BTreeSet<String>,
-    /// Whether the layout is complete and shall be shown.
+    /// Whether the layout is complete and to be activated.
     pub blueprint_activated: bool,
 }
 
-/// Reads a file; it panics with the reason where the file is not sound.
+/// Reads a file; panics with the reason if it is malformed.
 pub fn read(path: &Path) -> Recording {
     let file = File::open(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     let mut recording = Recording::default();
@@ -99,7 +99,7 @@ fn add(rows: &mut EntityRows, chunk: &Chunk) {
     }
 }
 
-/// The numbers of an array of `f32`, `f64`, or small vectors of them; nothing for other arrays.
+/// The numbers of an array of `f32`, `f64`, or small vectors of them; empty for other arrays.
 fn floats(array: &ArrayRef) -> Vec<f64> {
     if let Some(values) = array.as_primitive_opt::<Float64Type>() {
         values.values().to_vec()

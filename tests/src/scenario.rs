@@ -1,8 +1,8 @@
-//! Simulated approaches small enough to be rendered within a test.
+//! Simulated approaches that are small enough to be rendered within a test.
 
 use sightline_world::{Scenario, library};
 
-/// From 5 m to 3.2 m with images of half the size; the targets' window is halved with them.
+/// From 5 m to 3.2 m, with images of half the size; the window of the targets is half as large, too.
 pub fn short_approach() -> Scenario {
     let mut scenario = Scenario { seed: 3, ..Scenario::demo() };
     scenario.camera.image_size = 512;
@@ -22,8 +22,8 @@ pub fn slope_beyond_the_limit() -> Scenario {
     scenario
 }
 
-/// Starts 8 m from the target on level ground; the planned drive ends at 7.2 m, before a rock on the straight way that is too high
-/// to climb. Front hazcams of 256 px; with fewer samples a pixel their stereo shows steps that are none.
+/// Starts 8 m from the target on level ground; the planned drive ends at 7.2 m, before a rock on the straight path that is
+/// too high to climb. Front hazcams of 256 px; with fewer samples per pixel their stereo returns false steps.
 pub fn rock_on_the_way() -> Scenario {
     let mut scenario = library::scenario("obstacles-10").expect("a scenario of the library");
     scenario.seed = 3000;

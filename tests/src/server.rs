@@ -1,4 +1,4 @@
-//! A server in this process: requests go to the router as a function, without a network.
+//! A server in this process: requests are passed to the router as function calls, without a network.
 
 use std::path::Path;
 use std::sync::OnceLock;
@@ -23,13 +23,13 @@ use tower::ServiceExt;
 /// The access token of every server of the tests.
 pub const TOKEN: &str = "token-of-the-tests";
 
-/// The port by which the server in this process believes to be addressed.
+/// The port in the server's own address.
 pub const PORT: u16 = 7700;
 
 /// A pixel on the face of the large rock in the first image of the small drive.
 pub const PIXEL: [f64; 2] = [128.0, 150.0];
 
-/// How long a test waits for something that should be quick.
+/// Maximum time for an operation that should be quick.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 /// A server with its folders.
@@ -42,7 +42,7 @@ pub struct TestServer {
     pub traverse: String,
 }
 
-/// An answer, read to its end.
+/// A complete response.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
     /// Its status.
@@ -70,7 +70,7 @@ impl Answer {
         self.json()
     }
 
-    /// Asserts that it is a problem of that status and code, and returns its one sentence.
+    /// Asserts that the response is a problem with that status and code, and returns its sentence.
     pub fn problem(&self, status: u16, code: &str) -> String {
         assert_eq!(self.headers[header::CONTENT_TYPE], "application/problem+json", "{}", self.text());
         let problem = self.expect(status);
@@ -88,7 +88,7 @@ impl TestServer {
         Self { app: app(state.clone()), state, traverse }
     }
 
-    /// Sends a request as it is.
+    /// Sends a request unchanged.
     pub async fn send(&self, request: Request<Body>) -> Answer {
         let response = self.app.clone().oneshot(request).await.expect("the router never fails");
         let (parts, body) = response.into_parts();
@@ -96,7 +96,7 @@ impl TestServer {
         Answer { status: parts.status, headers: parts.headers, bytes: bytes.to_vec() }
     }
 
-    /// Reads a path below `/api/v1/`.
+    /// GETs a path below `/api/v1/`.
     pub async fn get(&self, path: &str) -> Answer {
         self.send(request(Method::GET, path).body(Body::empty()).expect("a request")).await
     }
@@ -106,13 +106,13 @@ impl TestServer {
         self.json(Method::POST, path, body).await
     }
 
-    /// Sends JSON by any method.
+    /// Sends JSON with any method.
     pub async fn json(&self, method: Method, path: &str, body: &Value) -> Answer {
         let request = request(method, path).header(header::CONTENT_TYPE, "application/json");
         self.send(request.body(Body::from(body.to_string())).expect("a request")).await
     }
 
-    /// Begins a session and returns its name.
+    /// Creates a session and returns its name.
     pub async fn begin(&self) -> String {
         let view = self.post("sessions", &json!({ "traverse": self.traverse })).await.expect(201);
         view["id"].as_str().expect("a name").to_owned()
@@ -141,12 +141,12 @@ impl TestServer {
     }
 }
 
-/// Who may use a server of the tests at that port: whoever has [`TOKEN`].
+/// Access rules of a test server at that port: [`TOKEN`] is required.
 pub fn access(port: u16) -> Access {
     Access::with_token(Hosts::new(port, &[]), Token::chosen(TOKEN).expect("a token"))
 }
 
-/// A request to a path below `/api/v1/` as a script with the token sends it.
+/// A request to a path below `/api/v1/`, as a script with the token sends it.
 pub fn request(method: Method, path: &str) -> axum::http::request::Builder {
     let uri = format!("/api/v1/{path}");
     let request =
@@ -165,7 +165,7 @@ pub fn small_scenario() -> Scenario {
     scenario
 }
 
-/// A folder with the small drive, rendered; a copy, so that it may be damaged.
+/// A folder with the rendered small drive; a copy, so that tests may damage it.
 pub fn small_drive() -> TempDir {
     static RENDERED: OnceLock<TempDir> = OnceLock::new();
     let rendered = RENDERED.get_or_init(|| {
@@ -181,7 +181,7 @@ pub fn small_drive() -> TempDir {
     copy
 }
 
-/// The small drive as a recording: without the scenario, so that a missing image stays missing.
+/// The small drive as a recording: without the scenario, so that a missing image is not rendered again.
 pub fn small_recording() -> TempDir {
     let folder = small_drive();
     let index = folder.path().join("traverse.toml");
@@ -192,7 +192,7 @@ pub fn small_recording() -> TempDir {
     folder
 }
 
-/// A recording of so many stops: the rover drives to and fro over the small drive's stops, which lends its images.
+/// A recording of `stop_count` stops: the rover drives to and fro over the stops of the small drive, with its images.
 pub fn long_recording(stop_count: usize) -> TempDir {
     let folder = small_recording();
     let traverse = Traverse::open(folder.path()).expect("the small recording");
@@ -211,7 +211,7 @@ pub fn long_recording(stop_count: usize) -> TempDir {
     folder
 }
 
-/// Copies a folder with all that is in it.
+/// Copies a folder with all its contents.
 pub fn copy_folder(from: &Path, to: &Path) {
     std::fs::create_dir_all(to).expect("a folder");
     for entry in std::fs::read_dir(from).expect("a folder") {

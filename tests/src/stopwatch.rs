@@ -1,22 +1,22 @@
-//! A stopwatch in the page: what the page itself computes for a key or a drag, and what it waits for.
+//! A stopwatch in the page: computing time of the page for a key or a drag, and waiting time.
 //!
-//! Chromium paints WebGL in software where there is no graphics card, which takes longer than everything the page
-//! computes, and the next animation frame only comes when that is done. So these times are told apart:
+//! Without a graphics card, Chromium paints WebGL in software, which takes longer than all computations of the page, and the
+//! next animation frame starts only after that. These times are therefore measured separately:
 //!
-//! - **own**: the time spent in the page's animation frames, from the key to the end of the frame that shows the step;
-//!   everything the page computes for a step happens in them;
-//! - **busy**: how long the page worked or at least one request was on its way, as the browser's own resource timing says;
-//!   what happens at the same time counts once;
+//! - **own**: time spent in the animation frames of the page, from the key to the end of the frame that shows the step;
+//!   they contain all computations of the page for a step;
+//! - **busy**: time during which the page worked or at least one request was in progress, by the browser's resource timing;
+//!   simultaneous intervals count once;
 //! - **shown**: from the key to the end of the frame that shows the step, with all waiting; with [`Painting::Off`] the page
-//!   draws nothing, so that nothing of this is the software's;
-//! - **complete**: the same until the last panel has what it shows;
+//!   draws nothing, so that it contains no software rendering;
+//! - **complete**: the same, until the last panel has its data;
 //! - **painted**: from the key to the frame after the painted one.
 
 use serde_json::Value;
 
 use crate::browser::Browser;
 
-/// Wraps the animation frames and the drawing, and watches keys and the page's status.
+/// Wraps the animation frames and the drawing, and observes keys and the page's status.
 const SCRIPT: &str = "\
     if (!window.stopwatch) { \
         const watch = window.stopwatch = {frames: [], laps: [], paints: true}; \
@@ -52,21 +52,21 @@ const SCRIPT: &str = "\
     } \
     window.stopwatch.frames = []; window.stopwatch.laps = []; performance.clearResourceTimings();";
 
-/// Whether the page draws.
+/// Whether the page is painted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Painting {
-    /// As a person sees it.
+    /// As for a user.
     On,
-    /// The page computes every frame and leaves its drawing out.
+    /// The page computes every frame and omits its drawing.
     Off,
 }
 
 /// From a key to the step that it leads to, ms.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lap {
-    /// The page's own work.
+    /// Computing time of the page.
     pub own_ms: f64,
-    /// Own work and waiting for the server's answers, until record and left image are shown.
+    /// Computing time and waiting for responses, until record and left image are shown.
     pub busy_ms: f64,
     /// The same, until the step is complete.
     pub all_ms: f64,
@@ -74,11 +74,11 @@ pub struct Lap {
     pub shown_ms: f64,
     /// Until the step is complete, with all waiting.
     pub complete_ms: f64,
-    /// Until it was painted.
+    /// Until the step is painted.
     pub painted_ms: f64,
 }
 
-/// Median and 95th percentile; none of nothing.
+/// Median and 95th percentile; `None` without values.
 pub fn spread(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
     let mut values: Vec<f64> = values.into_iter().collect();
     values.sort_by(f64::total_cmp);
@@ -87,15 +87,15 @@ pub fn spread(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
     Some((at(0.5), at(0.95)))
 }
 
-/// Sets the stopwatch to nothing; the first time it is put into the page.
+/// Resets the stopwatch; the first call installs it in the page.
 pub async fn begin(browser: &Browser, painting: Painting) {
     browser.evaluate(SCRIPT).await;
     browser.evaluate(&format!("window.stopwatch.paints = {}", painting == Painting::On)).await;
-    // The frame that was already asked for still goes by the browser's own function.
+    // A frame that is already requested still calls the browser's own function.
     tokio::time::sleep(std::time::Duration::from_millis(300)).await;
 }
 
-/// The laps since the beginning, one for each key that led to a step.
+/// The laps since [`begin`], one for each key that led to a step.
 pub async fn laps(browser: &Browser) -> Vec<Lap> {
     let read = |lap: &Value| {
         let number = |name: &str| lap[name].as_f64().unwrap_or(f64::NAN);
@@ -112,8 +112,8 @@ pub async fn laps(browser: &Browser) -> Vec<Lap> {
     laps.as_array().map(|laps| laps.iter().map(read).collect()).unwrap_or_default()
 }
 
-/// How long the page worked in each animation frame in which it laid itself out since the beginning, ms; one in which it
-/// finds that there is nothing to do takes a tenth of this.
+/// Computing time of each animation frame in which the page was laid out, since [`begin`], ms; a frame without changes takes
+/// a tenth of it.
 pub async fn frames(browser: &Browser) -> Vec<f64> {
     const LEAST_MS: f64 = 2.0;
     let frames = browser.evaluate("return window.stopwatch.frames.map(f => f[1])").await;

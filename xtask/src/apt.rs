@@ -1,4 +1,4 @@
-//! Installing Debian's packages, where that is possible without asking.
+//! Installs Debian packages if this is possible without a password.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -8,17 +8,17 @@ use anyhow::Result;
 
 use crate::cmd;
 
-/// Installs packages and says why; false on systems without `apt-get` or without the right to install.
+/// Installs packages and prints `why`; false on systems without `apt-get` or without permission to install.
 pub(crate) fn install(why: &str, packages: &[&str]) -> Result<bool> {
     let Some(apt_get) = apt_get() else { return Ok(false) };
-    cmd::say(format!("{why}: installing Debian's packages."));
+    cmd::print_line(format!("{why}: installing Debian's packages."));
     let mend = format!("install by hand: {}", packages.join(", "));
     cmd::run(apt_get().args(["update"]), &mend)?;
     cmd::run(apt_get().args(["install", "-y", "--no-install-recommends"]).args(packages), &mend)?;
     Ok(true)
 }
 
-/// How to run `apt-get` with the right to install, where that is possible without asking.
+/// The `apt-get` command with permission to install, if possible without a password.
 fn apt_get() -> Option<impl Fn() -> Command> {
     if !Path::new("/etc/debian_version").exists() {
         return None;

@@ -1,4 +1,4 @@
-//! `cargo xtask bench`: the benchmarks, in the profile everything else already compiled.
+//! `cargo xtask bench`: runs the benchmarks in the development profile, whose dependencies are already compiled.
 
 use anyhow::Result;
 
@@ -6,7 +6,7 @@ use crate::cmd;
 
 /// Runs the benchmarks whose names contain `filter`, or all of them.
 ///
-/// The development profile is optimised, and Cargo's own bench profile would compile every dependency once more.
+/// The development profile is optimised; Cargo's bench profile would compile every dependency again.
 pub(crate) fn bench(filter: Option<&str>) -> Result<()> {
     std::fs::create_dir_all(crate::web::output_dir())?;
     let mut cargo =

@@ -1,10 +1,10 @@
-//! Builds with Cargo, several at once, with one line about their progress and the remaining time.
+//! Runs several Cargo builds concurrently, with one line for their progress and the remaining time.
 //!
 //! The total is the number of packages that `cargo tree` lists; Cargo's JSON messages report each finished crate.
-//! The remaining time is the cost of the missing crates over the rate so far, with measured costs for the largest
-//! crates (`costs.rs`) because these come last. The rate begins as one second of processor time per second and core
-//! and counts the time until the last finished crate, so that waiting for another build does not lower it.
-//! All builds share one pool of jobs, one job per core.
+//! The remaining time is the cost of the missing crates divided by the rate so far, with measured costs for the largest
+//! crates (`costs.rs`) because these come last. The initial rate is one second of processor time per second and core. The
+//! rate covers the time until the last finished crate, so that waiting for another build does not lower it. All builds share
+//! one pool of jobs, one job per core.
 
 use std::collections::HashMap;
 use std::io::{BufRead, BufReader, IsTerminal, Write};
@@ -19,7 +19,7 @@ use crate::{cmd, costs};
 
 /// One Cargo build.
 pub(crate) struct Build {
-    /// What is built, as shown to the user.
+    /// Name of the build, as shown to the user.
     pub(crate) name: &'static str,
     /// The Cargo command; [`run`] adds the options for messages.
     pub(crate) command: Command,
@@ -32,7 +32,7 @@ pub(crate) struct Build {
 /// Runs the builds concurrently and returns the first error.
 pub(crate) fn run(builds: Vec<Build>) -> Result<()> {
     let mut progress = Progress::new(&builds)?;
-    // Every Cargo process owns one job besides those of the pool.
+    // Every Cargo process owns one job in addition to those of the pool.
     let cores = std::thread::available_parallelism().map_or(2, usize::from);
     let pool = Client::new(cores.saturating_sub(builds.len())).context("no pool of jobs can be made")?;
     let (sender, finished) = mpsc::channel();
@@ -42,7 +42,7 @@ pub(crate) fn run(builds: Vec<Build>) -> Result<()> {
                 let (sender, pool) = (sender.clone(), &pool);
                 scope.spawn(move || {
                     let done = one(index, build, pool, &sender);
-                    // The job of this build becomes free for the others.
+                    // Returns the job of this build to the pool.
                     pool.release_raw().unwrap_or_default();
                     done
                 })
@@ -81,7 +81,7 @@ fn one(index: usize, mut build: Build, pool: &Client, sender: &Sender<(usize, Un
 struct Unit {
     /// Name and version, such as `serde 1.0.229`.
     package: String,
-    /// It was compiled by an earlier build.
+    /// Whether it was compiled by an earlier build.
     is_fresh: bool,
 }
 
@@ -117,18 +117,18 @@ fn package_of_tree(line: &str) -> Option<String> {
 /// Weight of the assumed rate in the estimate, s of processor time.
 const ASSUMED_S: f64 = 60.0;
 
-/// The crates of all builds: which are missing, and how fast they are compiled.
+/// The progress of all builds: missing crates, and the rate of compilation.
 struct Progress {
     names: Vec<&'static str>,
     /// Cost of each missing crate by build and package, s of processor time.
     missing: HashMap<(usize, String), f64>,
     total: usize,
-    /// Cost of the crates that were compiled, s of processor time.
+    /// Total cost of the compiled crates, s of processor time.
     compiled_s: f64,
     started: Instant,
-    /// From the start to the first reported crate.
+    /// Time from the start to the first reported crate.
     waited: Option<Duration>,
-    /// From the start to the last crate that was compiled.
+    /// Time from the start to the last compiled crate.
     last_finish: Duration,
     cores: f64,
     terminal: bool,
@@ -183,7 +183,7 @@ impl Progress {
         }
     }
 
-    /// Removes a crate from the missing ones; a package can have several targets, the first counts.
+    /// Removes a crate from the missing ones; if a package has several targets, the first one counts.
     fn finish(&mut self, build: usize, unit: Unit, elapsed: Duration) {
         self.waited.get_or_insert(elapsed);
         let Some(cost) = self.missing.remove(&(build, unit.package)) else { return };
@@ -193,7 +193,7 @@ impl Progress {
         }
     }
 
-    /// Estimated time until the last crate is compiled, s; 0 where it takes longer than estimated.
+    /// Estimated time until the last crate is compiled, s; 0 if it takes longer than estimated.
     fn left_s(&self, elapsed: Duration) -> f64 {
         let waited = self.waited.unwrap_or(elapsed);
         let busy_s = self.last_finish.saturating_sub(waited).as_secs_f64();
@@ -207,7 +207,7 @@ impl Progress {
         write_error(&if self.terminal { format!("\r\x1b[K{line}") } else { format!("{line}\n") });
     }
 
-    /// Such as `building server and page: 312 of 640 crates, about 4 min left`.
+    /// A progress line, such as `building server and page: 312 of 640 crates, about 4 min left`.
     fn line(&self, elapsed: Duration) -> String {
         let open = |index: &usize| self.missing.keys().any(|(build, _)| build == index);
         let names: Vec<_> = (0..self.names.len()).filter(open).map(|index| self.names[index]).collect();
@@ -224,7 +224,7 @@ impl Progress {
     }
 }
 
-/// Writes to standard error; a closed one is no reason to stop the build.
+/// Writes to standard error; a closed stream does not stop the build.
 fn write_error(text: &str) {
     let mut error = std::io::stderr().lock();
     error.write_all(text.as_bytes()).and_then(|()| error.flush()).unwrap_or_default();

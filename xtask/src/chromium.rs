@@ -1,4 +1,4 @@
-//! The browser of the tests: found, or installed where Debian's packages can be.
+//! The browser for the tests: finds it, or installs it on Debian.
 
 use std::path::PathBuf;
 
@@ -14,7 +14,7 @@ pub(crate) struct Browser {
     pub(crate) chromedriver: PathBuf,
 }
 
-/// Finds the browser and its driver; on Debian, installs them when they are missing.
+/// Finds the browser and its driver; on Debian, installs them if missing.
 pub(crate) fn ensure() -> Result<Browser> {
     if let Some(browser) = find()? {
         return Ok(browser);
@@ -30,7 +30,7 @@ pub(crate) fn ensure() -> Result<Browser> {
     )
 }
 
-/// The browser that the environment or `PATH` names.
+/// The browser in the environment variables or in `PATH`.
 fn find() -> Result<Option<Browser>> {
     let chromium = one(
         "SIGHTLINE_CHROMIUM",
@@ -40,7 +40,7 @@ fn find() -> Result<Option<Browser>> {
     Ok(chromium.zip(chromedriver).map(|(chromium, chromedriver)| Browser { chromium, chromedriver }))
 }
 
-/// One program, from a variable or else from `PATH`.
+/// One program, from an environment variable or else from `PATH`.
 fn one(variable: &str, names: &[&str]) -> Result<Option<PathBuf>> {
     let Some(named) = std::env::var_os(variable) else { return Ok(cmd::find_in_path(names)) };
     let named = PathBuf::from(named);

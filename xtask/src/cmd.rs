@@ -1,4 +1,4 @@
-//! Running other programs: where they run, which environment they get, and how their failure is said.
+//! Runs other programs: working directory, environment, and error messages.
 
 use std::ffi::OsStr;
 use std::fmt::Display;
@@ -21,21 +21,21 @@ pub(crate) fn target_dir() -> PathBuf {
     std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), |dir| root().join(dir))
 }
 
-/// The program `sightline` as `cargo build` leaves it.
+/// The path of the program `sightline` after `cargo build`.
 pub(crate) fn sightline_binary() -> PathBuf {
     target_dir().join("debug").join(format!("sightline{}", std::env::consts::EXE_SUFFIX))
 }
 
-/// Prints one line to standard output; a closed pipe is not an error worth stopping for.
-pub(crate) fn say(line: impl Display) {
+/// Prints one line to standard output; a closed pipe is not an error.
+pub(crate) fn print_line(line: impl Display) {
     let mut out = std::io::stdout().lock();
     writeln!(out, "{line}").and_then(|()| out.flush()).unwrap_or_default();
 }
 
-/// A program that runs in the workspace's root.
+/// A command that runs in the workspace's root.
 ///
-/// `cargo run` describes `xtask` itself to us in variables that an inner Cargo or a build script would take for a
-/// description of another crate, so these are left out.
+/// `cargo run` describes `xtask` in environment variables that an inner Cargo or a build script would take for a description
+/// of another crate, so these are removed.
 pub(crate) fn program(name: impl AsRef<OsStr>) -> Command {
     let mut command = Command::new(name);
     command.current_dir(root());
@@ -51,7 +51,7 @@ pub(crate) fn program(name: impl AsRef<OsStr>) -> Command {
     command
 }
 
-/// The Cargo that runs us.
+/// The Cargo that runs this program.
 pub(crate) fn cargo(arguments: &[&str]) -> Command {
     let mut command = program(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.args(arguments);
@@ -63,30 +63,31 @@ pub(crate) fn rustc() -> Command {
     program(std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into()))
 }
 
-/// Runs a program to its end, sharing our terminal; `mend` says what to do when it fails.
+/// Runs a program to completion in the same terminal; `mend` is the advice after a failure.
 pub(crate) fn run(command: &mut Command, mend: &str) -> Result<()> {
-    let status = command.status().with_context(|| format!("{} cannot be started; {mend}", shown(command)))?;
+    let status =
+        command.status().with_context(|| format!("{} cannot be started; {mend}", command_line(command)))?;
     if !status.success() {
-        bail!("{} failed ({status}); {mend}", shown(command));
+        bail!("{} failed ({status}); {mend}", command_line(command));
     }
     Ok(())
 }
 
-/// Runs a program to its end and returns what it printed to standard output.
+/// Runs a program to completion and returns its standard output.
 pub(crate) fn output(command: &mut Command, mend: &str) -> Result<String> {
     let output = command
         .stdin(Stdio::null())
         .output()
-        .with_context(|| format!("{} cannot be started; {mend}", shown(command)))?;
+        .with_context(|| format!("{} cannot be started; {mend}", command_line(command)))?;
     if !output.status.success() {
-        let said = String::from_utf8_lossy(&output.stderr);
-        let last = said.lines().rfind(|line| !line.trim().is_empty()).unwrap_or("it said nothing");
-        bail!("{} failed ({}): {last}; {mend}", shown(command), output.status);
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        let last = stderr.lines().rfind(|line| !line.trim().is_empty()).unwrap_or("it said nothing");
+        bail!("{} failed ({}): {last}; {mend}", command_line(command), output.status);
     }
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
-/// Runs a program silently and for no longer than `limit`; true when it ended well.
+/// Runs a program silently, at most for `limit`; returns whether it succeeded.
 pub(crate) fn succeeds(command: &mut Command, limit: Duration) -> bool {
     let quiet = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     let Ok(mut child) = quiet.spawn() else { return false };
@@ -96,7 +97,7 @@ pub(crate) fn succeeds(command: &mut Command, limit: Duration) -> bool {
             Ok(Some(status)) => return status.success(),
             Ok(None) if start.elapsed() < limit => std::thread::sleep(Duration::from_millis(50)),
             Ok(None) | Err(_) => {
-                // The child may end between the question and the kill: either way it must be gone afterwards.
+                // The child may end between the check and the kill; it must be reaped in either case.
                 child.kill().unwrap_or_default();
                 return child.wait().is_ok_and(|status| status.success());
             }
@@ -114,8 +115,8 @@ pub(crate) fn find_in_path(names: &[&str]) -> Option<PathBuf> {
     })
 }
 
-/// A command line as a person would type it.
-fn shown(command: &Command) -> String {
+/// A command line as typed in a shell.
+fn command_line(command: &Command) -> String {
     let mut words = vec![
         Path::new(command.get_program())
             .file_name()

@@ -1,4 +1,4 @@
-//! The parts of the program to hand out: crates, the standard library, and files inside crates with licences of their own.
+//! The parts of the distributed program: crates, the standard library, and files inside crates with their own licences.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -18,12 +18,18 @@ pub(crate) struct Embedded {
     pub(crate) licence: &'static str,
     /// The file with the text of the licence; `None` if it is that of the package.
     pub(crate) text: Option<&'static str>,
-    /// Its own parts are not known from here.
-    pub(crate) has_unknown_parts: bool,
+    /// Whether its own components are unknown.
+    pub(crate) has_unknown_components: bool,
 }
 
 const fn font(file: &'static str, licence: &'static str, text: &'static str) -> Embedded {
-    Embedded { package: "epaint_default_fonts", file, licence, text: Some(text), has_unknown_parts: false }
+    Embedded {
+        package: "epaint_default_fonts",
+        file,
+        licence,
+        text: Some(text),
+        has_unknown_components: false,
+    }
 }
 
 /// The files with their own licences.
@@ -38,32 +44,32 @@ const EMBEDDED: [Embedded; 6] = [
         file: "web_viewer/re_viewer_bg.wasm",
         licence: "MIT OR Apache-2.0",
         text: None,
-        has_unknown_parts: true,
+        has_unknown_components: true,
     },
 ];
 
-/// Endings of files that can be embedded and have licences of their own.
+/// Extensions of files that can be embedded and have their own licences.
 const EMBEDDED_ENDINGS: [&str; 4] = ["ttf", "otf", "woff2", "wasm"];
 
 /// Folders of packages that are not compiled.
 const NOT_COMPILED: [&str; 7] = ["tests", "test", "benches", "examples", "programs", "contrib", "testdata"];
 
-/// One part.
-pub(crate) struct Part<'a> {
+/// One crate in the program or its page.
+pub(crate) struct Component<'a> {
     pub(crate) package: &'a Package,
     /// SHA-256 of the package's archive; `None` for the workspace's own packages.
     pub(crate) checksum: Option<&'a str>,
     pub(crate) is_in_program: bool,
     pub(crate) is_in_page: bool,
-    /// The parts that it needs.
+    /// Its runtime dependencies.
     pub(crate) needs: Vec<&'a Package>,
-    /// The files in it with their own licences.
+    /// Its files with their own licences.
     pub(crate) embedded: Vec<&'static Embedded>,
 }
 
-impl Part<'_> {
-    /// Where the part is, in words.
-    pub(crate) fn place(&self) -> &'static str {
+impl Component<'_> {
+    /// The location of the part, in words.
+    pub(crate) fn location(&self) -> &'static str {
         match (self.is_in_program, self.is_in_page) {
             (true, true) => "program and page",
             (true, false) => "program",
@@ -83,14 +89,14 @@ pub(crate) fn packages(host: &str) -> Result<Packages> {
 }
 
 /// Every package whose code is in the program for `host` or in its page, by name.
-pub(crate) fn parts<'a>(packages: &'a Packages, host: &str) -> Result<Vec<Part<'a>>> {
+pub(crate) fn components<'a>(packages: &'a Packages, host: &str) -> Result<Vec<Component<'a>>> {
     let program = packages::inside_program(host)?;
     let page = packages::inside_page()?;
     let all: BTreeSet<&Name> = program.union(&page).collect();
-    let part = |name: &Name| -> Result<Part<'a>> {
+    let component = |name: &Name| -> Result<Component<'a>> {
         let package = packages.get(name)?;
         let needed = packages.needs(name).filter(|needed| all.contains(needed));
-        let part = Part {
+        let component = Component {
             package,
             checksum: packages.checksum(name),
             is_in_program: program.contains(name),
@@ -98,28 +104,29 @@ pub(crate) fn parts<'a>(packages: &'a Packages, host: &str) -> Result<Vec<Part<'
             needs: needed.map(|needed| packages.get(needed)).collect::<Result<_>>()?,
             embedded: EMBEDDED.iter().filter(|embedded| embedded.package == package.name).collect(),
         };
-        refuse_unknown_files(&part)?;
-        Ok(part)
+        refuse_unknown_files(&component)?;
+        Ok(component)
     };
-    all.iter().map(|name| part(name)).collect()
+    all.iter().map(|name| component(name)).collect()
 }
 
-/// Fails if a dependency contains a file that may be embedded and has no entry in [`EMBEDDED`].
-fn refuse_unknown_files(part: &Part<'_>) -> Result<()> {
-    if part.package.source.is_none() {
+/// Fails if a dependency contains a file that may be embedded but has no entry in [`EMBEDDED`].
+fn refuse_unknown_files(component: &Component<'_>) -> Result<()> {
+    if component.package.source.is_none() {
         return Ok(());
     }
-    for file in compiled_files(part.folder())? {
+    for file in compiled_files(component.folder())? {
         let is_embedded =
             file.extension().is_some_and(|end| EMBEDDED_ENDINGS.iter().any(|known| end == *known));
-        if is_embedded && !part.embedded.iter().any(|known| part.folder().join(known.file) == file) {
-            bail!("{} may be embedded: give it a licence in xtask/src/parts.rs", file.display());
+        if is_embedded && !component.embedded.iter().any(|known| component.folder().join(known.file) == file)
+        {
+            bail!("{} may be embedded: give it a licence in xtask/src/components.rs", file.display());
         }
     }
     Ok(())
 }
 
-/// The files of a package without those of its tests and examples, in a fixed order.
+/// The files of a package, except its tests and examples, in a fixed order.
 pub(crate) fn compiled_files(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     let entries =
@@ -136,9 +143,9 @@ pub(crate) fn compiled_files(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-/// The version of the compiler, which is that of the standard library.
+/// The version of the compiler, which is also that of the standard library.
 pub(crate) fn standard_library() -> Result<String> {
-    let said = cmd::output(cmd::rustc().arg("-vV"), "install Rust with rustup")?;
-    let release = said.lines().find_map(|line| line.strip_prefix("release: ")).map(str::to_owned);
+    let version_text = cmd::output(cmd::rustc().arg("-vV"), "install Rust with rustup")?;
+    let release = version_text.lines().find_map(|line| line.strip_prefix("release: ")).map(str::to_owned);
     release.context("`rustc -vV` names no release")
 }

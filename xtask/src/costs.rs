@@ -1,6 +1,6 @@
 //! Processor time that the compiler needs for the largest crates, for the estimate of a build's remaining time.
 
-/// Processor time by crate, s; measured with the profile `dev`, of the viewer's crates with the profile `viewer`.
+/// Processor time per crate, s; measured with the profile `dev`, for the viewer's crates with the profile `viewer`.
 const COSTS_S: [(&str, f64); 46] = [
     ("sightline-core", 245.0),
     ("sightline-viewer", 130.0),
@@ -50,7 +50,7 @@ const COSTS_S: [(&str, f64); 46] = [
     ("regex-automata", 5.0),
 ];
 
-/// Processor time of every other crate, s: their mean.
+/// Mean processor time of all other crates, s.
 const OTHER_S: f64 = 0.6;
 
 /// The estimated processor time for compiling the crate `name`, s.

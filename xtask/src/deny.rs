@@ -1,8 +1,8 @@
 //! Applies the rules of `deny.toml` to every dependency: licences, banned packages and sources.
 //!
 //! The file has the format of [cargo-deny](https://embarkstudios.github.io/cargo-deny/), which gives the same verdict but
-//! takes longer to compile than all of these commands. Keys and values that this module does not apply are refused, so
-//! that no rule is silently without effect. Advisories are not checked: their database is on the network.
+//! takes longer to compile than all of these commands. Keys and values that this module does not implement are errors, so
+//! that no rule is silently ignored. Advisories are not checked, because their database requires the network.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -45,7 +45,7 @@ struct Licences {
     exceptions: Vec<Exception>,
 }
 
-/// Licences that one package may have.
+/// Additional licences allowed for one package.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Exception {
@@ -54,7 +54,7 @@ struct Exception {
     allow: Vec<LicenceName>,
 }
 
-/// An SPDX identifier, with its exception if it has one.
+/// An SPDX identifier with an optional exception.
 #[derive(Deserialize)]
 #[serde(try_from = "String")]
 struct LicenceName(Licensee);
@@ -93,14 +93,14 @@ struct Sources {
     allow_git: Vec<String>,
 }
 
-/// The only level of a rule that is applied.
+/// The only supported level of an active rule.
 #[derive(Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum Deny {
     Deny,
 }
 
-/// The only level of a rule that is not applied.
+/// The only supported level of an inactive rule.
 #[derive(Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum Allow {
@@ -123,7 +123,7 @@ pub(crate) fn check() -> Result<()> {
     let packages = rules.graph.packages()?;
     let findings = rules.findings(&packages);
     for finding in &findings {
-        cmd::say(finding);
+        cmd::print_line(finding);
     }
     if !findings.is_empty() {
         bail!(
@@ -131,7 +131,10 @@ pub(crate) fn check() -> Result<()> {
             findings.len()
         );
     }
-    cmd::say(format!("Licences, bans and sources of {} packages are as {FILE} allows.", packages.len()));
+    cmd::print_line(format!(
+        "Licences, bans and sources of {} packages are as {FILE} allows.",
+        packages.len()
+    ));
     Ok(())
 }
 
@@ -192,7 +195,7 @@ impl Licences {
     }
 }
 
-/// Parses an SPDX expression; older manifests have `/` for OR.
+/// Parses an SPDX expression; older manifests use `/` for OR.
 pub(crate) fn expression(text: &str) -> Result<Expression, spdx::ParseError> {
     Expression::parse_mode(text, ParseMode::LAX)
 }
@@ -261,7 +264,7 @@ mod tests {
         }
     }
 
-    /// The findings beside packages that need every licence of the list.
+    /// The findings for `added` and packages that use every licence of the list.
     fn findings(added: Package) -> Vec<String> {
         let all = [
             package("a", "MIT/GPL-2.0-only"),

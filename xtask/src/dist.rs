@@ -1,4 +1,4 @@
-//! `cargo xtask dist`: one program to hand out, with the viewer inside, and the papers that belong to it.
+//! `cargo xtask dist`: one program for distribution, with the viewer inside, and its accompanying files.
 //!
 //! ```text
 //! target/dist/sightline            the program
@@ -7,7 +7,7 @@
 //! target/dist/SHA256SUMS           the digests of these files, for `sha256sum --check`
 //! ```
 //!
-//! The same commit gives the same files, whatever the folders of the checkout, of Cargo and of the build
+//! The same commit gives the same files, independent of the folders of the checkout, of Cargo and of the build
 //! (`docs/release.md`).
 
 use std::path::{Path, PathBuf};
@@ -15,10 +15,11 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use jiff::Timestamp;
 
-use crate::bill::{self, Program, sha256};
-use crate::{cmd, licences, packages, parts, remap, web};
+use crate::sbom::{self, Program, sha256};
+use crate::{cmd, components, licences, packages, remap, web};
 
-/// Builds the page, then the optimised program that embeds it, and writes both with their papers to `target/dist`.
+/// Builds the page, then the optimised program that embeds it, and writes the program with its accompanying files to
+/// `target/dist`.
 pub(crate) fn dist() -> Result<()> {
     web::web()?;
     let target_dir = cmd::target_dir();
@@ -47,34 +48,37 @@ pub(crate) fn dist() -> Result<()> {
         sums.push_str(&format!("{}  {name}\n", sha256(content.as_bytes())));
     }
     write(&folder.join("SHA256SUMS"), &sums)?;
-    cmd::say(sums.trim_end());
-    cmd::say(format!("The program is {}; bill of materials and licences are beside it.", built.display()));
+    cmd::print_line(sums.trim_end());
+    cmd::print_line(format!(
+        "The program is {}; bill of materials and licences are beside it.",
+        built.display()
+    ));
     Ok(())
 }
 
-/// Bill of materials and licences of the program.
+/// The bill of materials and the licences of the program.
 fn papers(built: &Path, program: &[u8]) -> Result<[(&'static str, String); 2]> {
-    let said =
+    let version =
         cmd::output(cmd::program(built).arg("--version"), "the program that was built does not start")?;
-    let said = said.trim();
+    let version = version.trim();
     let host = packages::host()?;
-    let packages = parts::packages(&host)?;
-    let parts = parts::parts(&packages, &host)?;
-    let library = parts::standard_library()?;
+    let packages = components::packages(&host)?;
+    let components = components::components(&packages, &host)?;
+    let library = components::standard_library()?;
     let time = time()?;
     let described = Program {
-        version: said.strip_prefix("sightline ").unwrap_or(said),
+        version: version.strip_prefix("sightline ").unwrap_or(version),
         library: &library,
         target: &host,
         sha256: &sha256(program),
         time: time.as_deref(),
     };
-    let mut bill = serde_json::to_string_pretty(&bill::bill(&parts, &described)?)?;
-    bill.push('\n');
-    Ok([("sightline.cdx.json", bill), ("LICENSES.txt", licences::listing(&parts, said, &library)?)])
+    let mut sbom = serde_json::to_string_pretty(&sbom::sbom(&components, &described)?)?;
+    sbom.push('\n');
+    Ok([("sightline.cdx.json", sbom), ("LICENSES.txt", licences::listing(&components, version, &library)?)])
 }
 
-/// The time that stands for the build's, which would differ each time: `SOURCE_DATE_EPOCH`, or else that of the commit.
+/// The reproducible time stamp of the bill: `SOURCE_DATE_EPOCH`, or else the time of the commit.
 fn time() -> Result<Option<String>> {
     let seconds = match std::env::var("SOURCE_DATE_EPOCH") {
         Ok(seconds) => seconds,

@@ -1,17 +1,17 @@
-//! `cargo xtask drill`: the program under load and in trouble, on the whole scale, as a table.
+//! `cargo xtask drill`: tests the program under load and with faults, at full scale, and prints a table.
 
 use anyhow::Result;
 
 use crate::{cmd, serve, test};
 
-/// Points at which the power is cut, and moments at which the program is killed.
+/// Number of power cuts, and number of times that the program is killed.
 const CUTS: &str = "1000";
 const KILLS: &str = "200";
 
-/// The beginning of a line of the table in the output of the tests, which may follow the name of a test.
+/// The start of a table line in the output of the tests, which may follow the name of a test.
 const MARK: &str = "drill | ";
 
-/// Runs every drill, one after the other, and prints the table of their outcomes, also if one of them fails.
+/// Runs every drill in sequence and prints the table of outcomes, even if one of them fails.
 pub(crate) fn drill() -> Result<()> {
     serve::build_all()?;
     let mut command =
@@ -22,20 +22,20 @@ pub(crate) fn drill() -> Result<()> {
     let mut outcomes = Vec::new();
     let count = test::run_and_read(&mut command, |line| outcomes.extend(outcome(line)));
     for line in table(&outcomes) {
-        cmd::say(line);
+        cmd::print_line(line);
     }
-    cmd::say(count?.shown());
+    cmd::print_line(count?.shown());
     Ok(())
 }
 
-/// The name of a drill and its outcome, of a line of the tests.
+/// The name and outcome of a drill, parsed from a line of the tests.
 fn outcome(line: &str) -> Option<[String; 2]> {
     let (_, rest) = line.split_once(MARK)?;
     let (name, outcome) = rest.split_once(" | ")?;
     Some([name, outcome].map(|text| text.trim().to_owned()))
 }
 
-/// The lines of the table, with a column of equal width.
+/// The lines of the table, with the first column padded to equal width.
 fn table(outcomes: &[[String; 2]]) -> Vec<String> {
     let width = outcomes.iter().map(|[name, _]| name.chars().count()).max().unwrap_or(0).max("drill".len());
     let mut lines = vec![String::new(), format!("| {:<width$} | outcome", "drill")];

@@ -1,4 +1,4 @@
-//! Compares the features with which the server's dependencies are compiled alone and in the whole workspace.
+//! Compares the features of the server's dependencies when compiled alone and in the whole workspace.
 
 use std::collections::BTreeSet;
 
@@ -8,7 +8,7 @@ use crate::cmd;
 
 /// Fails if `cargo test` would compile a dependency of the server with other features than `cargo xtask serve`.
 pub(crate) fn check() -> Result<()> {
-    // Cargo compiles dependencies of build scripts and macros apart, with features of their own.
+    // Cargo compiles dependencies of build scripts and macros separately, with their own features.
     let server = tree(&["--package", "sightline-server", "--edges", "normal,no-proc-macro"])?;
     let workspace = tree(&["--workspace", "--exclude", "xtask", "--edges", "normal,dev,no-proc-macro"])?;
     let differing: Vec<_> = missing(&server, &workspace);
@@ -19,7 +19,7 @@ pub(crate) fn check() -> Result<()> {
             differing.join("\n")
         );
     }
-    cmd::say("The server and the tests share their compiled dependencies.");
+    cmd::print_line("The server and the tests share their compiled dependencies.");
     Ok(())
 }
 
@@ -30,7 +30,7 @@ fn tree(selection: &[&str]) -> Result<BTreeSet<String>> {
     Ok(listed.lines().map(|line| line.trim_end_matches(" (*)").to_owned()).collect())
 }
 
-/// The lines of `part` that `whole` lacks.
+/// The lines of `part` that are missing in `whole`.
 fn missing(part: &BTreeSet<String>, whole: &BTreeSet<String>) -> Vec<String> {
     part.difference(whole).cloned().collect()
 }

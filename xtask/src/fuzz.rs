@@ -1,8 +1,8 @@
-//! `cargo xtask fuzz`: searches for inputs that break a parser, with libFuzzer on the stable compiler.
+//! `cargo xtask fuzz`: searches for inputs that make a parser fail, with libFuzzer on the stable compiler.
 //!
-//! The engine needs to see which branches an input reaches. The compiler inserts the counters for that into the
-//! workspace's own crates; the dependencies stay as they are compiled for everything else. Cargo asks for the workspace's
-//! crates through this program itself ([`as_compiler`]), which adds the options.
+//! The engine needs to know which branches an input reaches. The compiler inserts counters into the workspace's own crates;
+//! the dependencies are compiled as for everything else. Cargo compiles the workspace's crates through this program
+//! ([`as_compiler`]), which adds the options.
 
 use std::ffi::OsString;
 use std::fs::File;
@@ -14,10 +14,10 @@ use anyhow::{Context, Result, bail};
 
 use crate::{apt, cmd};
 
-/// Says to this program that it is run in place of the compiler.
+/// Environment variable that makes this program act as the compiler.
 const AS_COMPILER: &str = "SIGHTLINE_FUZZ_COMPILER";
 
-/// What the compiler inserts: counters of branches, and calls that show the engine what is compared.
+/// Compiler options that insert counters of branches, and calls that report comparisons to the engine.
 const INSTRUMENTS: [&str; 6] = [
     "-Cpasses=sancov-module",
     "-Cllvm-args=-sanitizer-coverage-level=4",
@@ -27,14 +27,14 @@ const INSTRUMENTS: [&str; 6] = [
     "-Ccodegen-units=1",
 ];
 
-/// Crates that run while others are built, where there is no engine to link with.
+/// Crates that run during the build, when there is no engine to link with.
 const BUILD_CRATES: [&str; 2] = ["build_script_build", "sightline_sources"];
 
-/// The longest time for one input, s.
+/// Maximum time for one input, s.
 const INPUT_SECONDS_MAX: u32 = 5;
-/// The most memory of a parser, MiB.
+/// Maximum memory of a parser, MiB.
 const MEMORY_MIB_MAX: u32 = 2048;
-/// The longest input, bytes.
+/// Maximum length of an input, bytes.
 const INPUT_BYTES_MAX: u32 = 1 << 16;
 
 /// Compiles a crate of the workspace with counters, if Cargo runs this program as its compiler.
@@ -52,7 +52,7 @@ pub(crate) fn as_compiler() -> Option<ExitCode> {
     Some(if is_compiled { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// How the search in one parser ended.
+/// The outcome of the search in one parser.
 struct Outcome {
     target: String,
     executions: String,
@@ -60,13 +60,13 @@ struct Outcome {
     inputs: usize,
     peak_mib: String,
     slowest_s: String,
-    /// The input that broke it.
+    /// The input that made the parser fail; `None` if none was found.
     found: Option<PathBuf>,
 }
 
-/// Searches for `minutes` in the parser of this name, or in each of them, as many at a time as there are processors.
+/// Searches for `minutes` in the parser of this name, or in all parsers, as many at a time as there are processors.
 ///
-/// What a search learns stays in `target/fuzz` and serves the next one.
+/// The interesting inputs stay in `target/fuzz` for the next search.
 pub(crate) fn fuzz(target: Option<&str>, minutes: f64) -> Result<()> {
     let all = targets()?;
     let chosen: Vec<String> = match target {
@@ -90,7 +90,7 @@ pub(crate) fn fuzz(target: Option<&str>, minutes: f64) -> Result<()> {
     report(outcomes.into_iter().flatten().collect())
 }
 
-/// The parsers: each has a folder of inputs.
+/// The parsers; each has a folder of inputs.
 fn targets() -> Result<Vec<String>> {
     let folder = corpus();
     let entries =
@@ -101,12 +101,12 @@ fn targets() -> Result<Vec<String>> {
     Ok(names)
 }
 
-/// The inputs that belong to the project.
+/// The folder of inputs in the repository.
 fn corpus() -> PathBuf {
     cmd::root().join("tests/fuzz/corpus")
 }
 
-/// Finds a C++ compiler for the engine; on Debian, installs it.
+/// Finds a C++ compiler for the engine; on Debian, installs it if missing.
 fn ensure_cxx() -> Result<()> {
     let is_there =
         || std::env::var_os("CXX").is_some() || cmd::find_in_path(&["c++", "g++", "clang++"]).is_some();
@@ -116,12 +116,12 @@ fn ensure_cxx() -> Result<()> {
     bail!("the engine of the search needs a C++ compiler: install g++ or clang, or set CXX")
 }
 
-/// Builds the search; returns the program.
+/// Builds the search program; returns its path.
 fn build() -> Result<PathBuf> {
     ensure_cxx()?;
     let mut cargo = cmd::cargo(&["build", "--package", "sightline-fuzz", "--features", "libfuzzer"]);
     cargo.env("RUSTC_WORKSPACE_WRAPPER", std::env::current_exe()?).env(AS_COMPILER, "1");
-    // Incremental builds cannot tell that the options changed.
+    // Incremental builds do not detect the changed options.
     cargo.env("CARGO_INCREMENTAL", "0");
     cmd::run(&mut cargo, "mend what the compiler reports above")?;
     let program =
@@ -137,7 +137,7 @@ fn search(program: &Path, target: &str, minutes: f64) -> Result<Outcome> {
         std::fs::create_dir_all(folder).with_context(|| format!("{} cannot be made", folder.display()))?;
     }
     let log = folder.join("log.txt");
-    cmd::say(format!("{target}: {minutes} min, log {}", log.display()));
+    cmd::print_line(format!("{target}: {minutes} min, log {}", log.display()));
     let written = File::create(&log).with_context(|| format!("{} cannot be written", log.display()))?;
     let began = std::time::SystemTime::now();
     let status = cmd::program(program)
@@ -167,7 +167,7 @@ fn search(program: &Path, target: &str, minutes: f64) -> Result<Outcome> {
     })
 }
 
-/// A number of the summary at the end of a log.
+/// A number from the summary at the end of a log.
 fn stat(log: &str, name: &str) -> String {
     let line = log.lines().rev().find_map(|line| line.strip_prefix("stat::")?.strip_prefix(name));
     line.map_or_else(|| "–".to_owned(), |rest| rest.trim_start_matches(':').trim().to_owned())
@@ -179,17 +179,17 @@ fn branches(log: &str) -> String {
     log.lines().rev().find_map(number).unwrap_or_else(|| "–".to_owned())
 }
 
-/// The newest file of a folder that was written since.
+/// The newest file of a folder modified after `since`.
 fn newest(folder: &Path, since: std::time::SystemTime) -> Option<PathBuf> {
     let entries = std::fs::read_dir(folder).ok()?.flatten();
     let dated = entries.filter_map(|entry| Some((entry.metadata().ok()?.modified().ok()?, entry.path())));
     dated.filter(|(time, _)| *time >= since).max().map(|(_, path)| path)
 }
 
-/// Prints the table; fails if an input broke a parser.
+/// Prints the table; fails if an input made a parser fail.
 fn report(mut outcomes: Vec<Outcome>) -> Result<()> {
     outcomes.sort_by(|a, b| a.target.cmp(&b.target));
-    cmd::say(format!(
+    cmd::print_line(format!(
         "\n{:<20} {:>12} {:>9} {:>7} {:>9} {:>11}  outcome",
         "parser", "executions", "branches", "inputs", "peak MiB", "slowest, s"
     ));
@@ -197,7 +197,7 @@ fn report(mut outcomes: Vec<Outcome>) -> Result<()> {
         let end =
             outcome.found.as_ref().map_or_else(|| "no failure".to_owned(), |path| path.display().to_string());
         let Outcome { target, executions, branches, inputs, peak_mib, slowest_s, .. } = outcome;
-        cmd::say(format!(
+        cmd::print_line(format!(
             "{target:<20} {executions:>12} {branches:>9} {inputs:>7} {peak_mib:>9} {slowest_s:>11}  {end}"
         ));
     }

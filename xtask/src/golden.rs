@@ -10,8 +10,8 @@ pub(crate) fn golden(is_update: bool) -> Result<()> {
     if is_update {
         command.env("SIGHTLINE_GOLDEN", "update");
         cmd::run(&mut command, "mend the tests reported above; the lists may be written in part")?;
-        cmd::say("Golden lists written, except those named above as left out.");
-        cmd::say(
+        cmd::print_line("Golden lists written, except those named above as left out.");
+        cmd::print_line(
             "Look at `git diff core/tests/golden/lists`, then commit it with the change that it belongs to.",
         );
     } else {
@@ -20,7 +20,7 @@ pub(crate) fn golden(is_update: bool) -> Result<()> {
             &mut command,
             "mend the code, or record the lists again with `cargo xtask golden --update` if the change is intended",
         )?;
-        cmd::say("Golden lists unchanged; those named above as left out were not compared.");
+        cmd::print_line("Golden lists unchanged; those named above as left out were not compared.");
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! The rules of the house that a program can check; each message says how to mend what it found.
+//! The project's own rules, as far as a program can check them; each message says how to resolve the finding.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -10,10 +10,10 @@ use syn::visit::{self, Visit};
 
 use crate::imports::{self, NamedPath};
 
-/// The most lines that a file of the tracker, the server and these commands may have.
+/// Maximum number of lines of a file of the tracker, the server and these commands.
 const FILE_LINES: usize = 400;
 
-/// The crates, and the most lines that one of their functions may have.
+/// The crates, and the maximum number of lines of their functions.
 const CRATES: [(&str, Option<usize>); 6] = [
     ("core", Some(60)),
     ("experiments", Some(60)),
@@ -23,7 +23,7 @@ const CRATES: [(&str, Option<usize>); 6] = [
     ("xtask", Some(60)),
 ];
 
-/// What the tracker must not know: the browser runs it, and the same input must give the same bits.
+/// Dependencies and modules forbidden in the core: it also runs in the browser, and the same input must give the same bits.
 const NOT_IN_CORE: [&[&str]; 12] = [
     &["tokio"],
     &["axum"],
@@ -39,7 +39,7 @@ const NOT_IN_CORE: [&[&str]; 12] = [
     &["thread", "spawn"],
 ];
 
-/// One place where a rule is broken.
+/// One violation of a rule.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Finding {
     file: PathBuf,
@@ -48,7 +48,7 @@ pub(crate) struct Finding {
 }
 
 impl Finding {
-    /// A rule that is broken at a line of a file.
+    /// A violation at a line of a file.
     pub(crate) const fn new(file: PathBuf, line: usize, message: String) -> Self {
         Self { file, line, message }
     }
@@ -60,7 +60,7 @@ impl fmt::Display for Finding {
     }
 }
 
-/// Every broken rule in the workspace at `root`.
+/// Every violation in the workspace at `root`.
 pub(crate) fn broken_rules(root: &Path) -> Result<Vec<Finding>> {
     let mut findings = Vec::new();
     for (name, function_lines) in CRATES {
@@ -105,7 +105,7 @@ pub(crate) fn read(root: &Path, file: &Path) -> Result<String> {
     std::fs::read_to_string(root.join(file)).with_context(|| format!("{} cannot be read", file.display()))
 }
 
-/// Every broken rule in one Rust file.
+/// Every violation in one Rust file.
 fn broken_in_source(
     crate_name: &str,
     function_lines: Option<usize>,
@@ -147,7 +147,7 @@ fn broken_in_source(
     Ok(findings)
 }
 
-/// What is wrong with the file's header, if anything.
+/// The fault of the file's header, if any.
 fn header_fault(text: &str) -> Option<&'static str> {
     let header: Vec<&str> = text.lines().map_while(|line| line.strip_prefix("//!")).collect();
     let words = header.join(" ");
@@ -160,7 +160,7 @@ fn header_fault(text: &str) -> Option<&'static str> {
     }
 }
 
-/// What is wrong with naming this path in this file, if anything.
+/// Why this path must not be used in this file, if so.
 fn path_fault(crate_name: &str, file: &Path, path: &NamedPath, all: &[NamedPath]) -> Option<&'static str> {
     // `server/src/…` and `core/track/src/…`
     let is_source = file.components().skip(1).take(2).any(|part| part.as_os_str() == "src");
@@ -200,7 +200,7 @@ fn path_fault(crate_name: &str, file: &Path, path: &NamedPath, all: &[NamedPath]
     }
 }
 
-/// True when the path makes a colour of constants.
+/// True if the path constructs a colour from constants.
 fn is_colour(path: &NamedPath) -> bool {
     let [.., owner, name] = path.segments.as_slice() else {
         return path.segments == ["hex_color"];
@@ -217,9 +217,9 @@ fn is_colour(path: &NamedPath) -> bool {
         || (is_constant && !matches!(name.as_str(), "TRANSPARENT" | "PLACEHOLDER"))
 }
 
-/// Tasks left in the text without the number of the issue that will see to them.
+/// Tasks in the text without an issue number.
 fn unnumbered_tasks(file: &Path, text: &str) -> Vec<Finding> {
-    // Put together here, so that this file does not name what it looks for.
+    // Assembled here, so that this file does not contain the words.
     let words = [concat!("TO", "DO"), concat!("FIX", "ME")];
     let mut findings = Vec::new();
     for (index, line) in text.lines().enumerate() {
@@ -237,7 +237,7 @@ fn unnumbered_tasks(file: &Path, text: &str) -> Vec<Finding> {
     findings
 }
 
-/// Finds the functions that are too long, from `fn` to the closing brace.
+/// Finds functions that are too long, from `fn` to the closing brace.
 struct LongFunctions {
     allowed: usize,
     found: Vec<(usize, String, usize)>,
@@ -372,7 +372,7 @@ mod tests {
     }
 
     #[test]
-    fn the_workspace_keeps_the_rules_of_the_house() {
+    fn the_workspace_follows_the_house_rules() {
         let findings = broken_rules(&crate::cmd::root()).expect("the workspace is read");
         let listed: Vec<String> = findings.iter().map(ToString::to_string).collect();
         assert!(findings.is_empty(), "mend these:\n{}", listed.join("\n"));

@@ -1,20 +1,20 @@
-//! The paths that a source file names, read from its tokens: in code, in imports and inside macros alike.
+//! The paths used in a source file, read from its tokens: in code, in imports and inside macros.
 
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 
-/// A path as it is written, with the prefix of the import group in which it stands.
+/// A path as written, with the prefix of its import group.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct NamedPath {
-    /// The names between the double colons; an imported `*` is a name here.
+    /// The segments between the double colons; an imported `*` counts as a segment.
     pub(crate) segments: Vec<String>,
-    /// The line of the first name that is the path's own.
+    /// The line of the first segment after the prefix.
     pub(crate) line: usize,
-    /// True when arguments follow and all of them are literals.
+    /// True if arguments follow and all of them are literals.
     pub(crate) has_literal_arguments: bool,
 }
 
 impl NamedPath {
-    /// True when the path begins with these names.
+    /// True if the path starts with these names.
     pub(crate) fn begins_with(&self, names: &[&str]) -> bool {
         self.segments.len() >= names.len()
             && self.segments.iter().zip(names).all(|(segment, name)| segment == name)
@@ -28,7 +28,7 @@ pub(crate) fn named_paths(tokens: TokenStream) -> Vec<NamedPath> {
     paths
 }
 
-/// Collects the paths of one group of tokens, each behind `prefix`.
+/// Collects the paths of one group of tokens, each with `prefix`.
 fn collect(tokens: TokenStream, prefix: &[String], paths: &mut Vec<NamedPath>) {
     let tokens: Vec<TokenTree> = tokens.into_iter().collect();
     let mut at = 0;
@@ -44,7 +44,7 @@ fn collect(tokens: TokenStream, prefix: &[String], paths: &mut Vec<NamedPath>) {
     }
 }
 
-/// Collects the path that begins at `at`, and what an import group behind it names; returns where it ends.
+/// Collects the path that starts at `at`, and the paths of an import group after it; returns the index of its end.
 fn collect_path(tokens: &[TokenTree], mut at: usize, prefix: &[String], paths: &mut Vec<NamedPath>) -> usize {
     let line = tokens[at].span().start().line;
     let mut segments = prefix.to_vec();
@@ -74,14 +74,14 @@ fn collect_path(tokens: &[TokenTree], mut at: usize, prefix: &[String], paths: &
     at
 }
 
-/// True when the two tokens from `at` are the two colons of a path.
+/// True if the two tokens from `at` are the double colon of a path.
 fn is_double_colon(tokens: &[TokenTree], at: usize) -> bool {
     let is_colon =
         |at: usize| matches!(tokens.get(at), Some(TokenTree::Punct(colon)) if colon.as_char() == ':');
     is_colon(at) && is_colon(at + 1)
 }
 
-/// True when the tokens are literals, signs, commas and groups of these.
+/// True if the tokens are literals, punctuation and groups of these.
 fn has_only_literals(tokens: TokenStream) -> bool {
     tokens.into_iter().all(|token| match token {
         TokenTree::Literal(_) | TokenTree::Punct(_) => true,

@@ -1,7 +1,7 @@
-//! `LICENSES.txt`: the licence of each part of the program and of its page, and every text once.
+//! `LICENSES.txt`: the licence of each part of the program and its page, and each text once.
 //!
-//! The texts come from the packages. A package without one of its own gets the standard text of one of its licences
-//! with its authors.
+//! The texts come from the packages. A package without a licence text gets the standard text of one of its licences with its
+//! authors.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -10,19 +10,19 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use spdx::Licensee;
 
-use crate::parts::{Part, compiled_files};
+use crate::components::{Component, compiled_files};
 use crate::{cmd, deny};
 
 /// Words in the names of files that contain licences.
 const WORDS: [&str; 6] = ["license", "licence", "copying", "copyright", "notice", "patents"];
 
-/// Endings of files that are no texts, although their names contain such a word.
+/// File extensions that are not licence texts, even if the name contains such a word.
 const NO_TEXTS: [&str; 9] = ["rs", "toml", "json", "js", "py", "sh", "yml", "yaml", "h"];
 
-/// Texts in the order of their first use; each has a number from 1.
+/// Distinct texts in the order of their first use, numbered from 1.
 #[derive(Default)]
 struct Texts {
-    /// By the words of the text: line ends differ between packages.
+    /// Keyed by the words of the text, because line breaks differ between packages.
     numbers: BTreeMap<String, usize>,
     texts: Vec<String>,
 }
@@ -37,8 +37,8 @@ impl Texts {
     }
 }
 
-/// The file's content; `version` is that of the program, `library` that of the standard library.
-pub(crate) fn listing(parts: &[Part<'_>], version: &str, library: &str) -> Result<String> {
+/// The file's content; `version` is the version of the program, `library` that of the standard library.
+pub(crate) fn listing(components: &[Component<'_>], version: &str, library: &str) -> Result<String> {
     let standard = Standard::read(&cmd::root())?;
     let mut texts = Texts::default();
     let mut list = format!(
@@ -52,19 +52,22 @@ pub(crate) fn listing(parts: &[Part<'_>], version: &str, library: &str) -> Resul
         "Rust standard library {library} | program and page | MIT OR Apache-2.0 | {}",
         shown(&[number])
     )?;
-    for part in parts.iter().filter(|part| part.package.source.is_some()) {
-        let package = part.package;
-        let numbers: Vec<_> = texts_of(part, &standard)?.iter().map(|text| texts.number(text)).collect();
+    for component in components.iter().filter(|component| component.package.source.is_some()) {
+        let package = component.package;
+        let numbers: Vec<_> = texts_of(component, &standard)?.iter().map(|text| texts.number(text)).collect();
         let licence = canonical(package.license.as_deref().unwrap_or_default());
-        let (name, version, place) = (&package.name, &package.version, part.place());
+        let (name, version, place) = (&package.name, &package.version, component.location());
         writeln!(list, "{name} {version} | {place} | {licence} | {}", shown(&numbers))?;
-        for embedded in &part.embedded {
+        for embedded in &component.embedded {
             let numbers = match embedded.text {
-                Some(file) => vec![texts.number(&read(&part.folder().join(file))?)],
+                Some(file) => vec![texts.number(&read(&component.folder().join(file))?)],
                 None => numbers.clone(),
             };
-            let more =
-                if embedded.has_unknown_parts { "; its own parts are listed by its project" } else { "" };
+            let more = if embedded.has_unknown_components {
+                "; its own parts are listed by its project"
+            } else {
+                ""
+            };
             let (file, licence) = (embedded.file, embedded.licence);
             writeln!(list, "{name} {version}, {file} | {place} | {licence}{more} | {}", shown(&numbers))?;
         }
@@ -79,12 +82,12 @@ fn shown(numbers: &[usize]) -> String {
     numbers.iter().map(|number| format!("[{number}]")).collect::<Vec<_>>().join(" ")
 }
 
-/// The expression as SPDX writes it: older manifests have `/` for OR.
+/// The canonical SPDX expression; older manifests use `/` for OR.
 pub(crate) fn canonical(licence: &str) -> String {
     spdx::Expression::canonicalize(licence).ok().flatten().unwrap_or_else(|| licence.to_owned())
 }
 
-/// The standard texts, of this project.
+/// The standard texts in this repository.
 struct Standard {
     mit: String,
     apache: String,
@@ -95,13 +98,13 @@ impl Standard {
         Ok(Self { mit: read(&root.join("LICENSE-MIT"))?, apache: read(&root.join("LICENSE-APACHE"))? })
     }
 
-    /// The text for a package without one: that of Apache-2.0 if its licence allows that, else of MIT.
-    fn text(&self, part: &Part<'_>) -> Result<String> {
-        let package = part.package;
+    /// The text for a package without one: Apache-2.0 if allowed by its licence, else MIT.
+    fn text(&self, component: &Component<'_>) -> Result<String> {
+        let package = component.package;
         let declared = package.license.as_deref().unwrap_or_default();
         let expression =
             deny::expression(declared).with_context(|| format!("{declared} is no SPDX expression"))?;
-        let files = part.embedded.iter().map(|embedded| embedded.licence);
+        let files = component.embedded.iter().map(|embedded| embedded.licence);
         let satisfied_with = |own: &'static str| {
             let given: Vec<_> =
                 files.clone().chain([own]).flat_map(|text| Licensee::parse(text).ok()).collect();
@@ -123,18 +126,21 @@ impl Standard {
     }
 }
 
-/// The texts of a package without those of its embedded files.
-fn texts_of(part: &Part<'_>, standard: &Standard) -> Result<Vec<String>> {
-    let of_embedded: Vec<_> =
-        part.embedded.iter().filter_map(|embedded| Some(part.folder().join(embedded.text?))).collect();
+/// The texts of a package, except those of its embedded files.
+fn texts_of(component: &Component<'_>, standard: &Standard) -> Result<Vec<String>> {
+    let of_embedded: Vec<_> = component
+        .embedded
+        .iter()
+        .filter_map(|embedded| Some(component.folder().join(embedded.text?)))
+        .collect();
     let mut texts = Vec::new();
-    for file in compiled_files(part.folder())? {
+    for file in compiled_files(component.folder())? {
         if is_licence(&file) && !of_embedded.contains(&file) {
             texts.push(read(&file)?);
         }
     }
     if texts.is_empty() {
-        texts.push(standard.text(part)?);
+        texts.push(standard.text(component)?);
     }
     Ok(texts)
 }
@@ -155,7 +161,7 @@ mod tests {
     use super::*;
     use crate::packages::Package;
 
-    /// The list of one package with this licence, these authors and these files.
+    /// The listing of one package with this licence, these authors and these files.
     fn listed(licence: &str, authors: &[&str], files: &[(&str, &str)]) -> Result<String> {
         let folder = tempfile::tempdir().expect("a temporary folder");
         for (name, text) in files {
@@ -172,7 +178,7 @@ mod tests {
             manifest_path: folder.path().join("Cargo.toml"),
             ..Package::default()
         };
-        let part = Part {
+        let component = Component {
             package: &package,
             checksum: None,
             is_in_program: true,
@@ -180,7 +186,7 @@ mod tests {
             needs: Vec::new(),
             embedded: Vec::new(),
         };
-        listing(&[part], "sightline 0", "1.0.0")
+        listing(&[component], "sightline 0", "1.0.0")
     }
 
     #[test]
@@ -199,12 +205,12 @@ mod tests {
     #[test]
     fn every_part_of_the_program_has_a_text() {
         let host = crate::packages::host().expect("a compiler");
-        let packages = crate::parts::packages(&host).expect("packages");
-        let parts = crate::parts::parts(&packages, &host).expect("parts");
-        let list = listing(&parts, "sightline 0", "1.0.0").expect("texts");
-        for part in &parts {
-            let line = format!("\n{} {} | ", part.package.name, part.package.version);
-            assert_eq!(list.contains(&line), part.package.source.is_some(), "{line}");
+        let packages = crate::components::packages(&host).expect("packages");
+        let components = crate::components::components(&packages, &host).expect("parts");
+        let list = listing(&components, "sightline 0", "1.0.0").expect("texts");
+        for component in &components {
+            let line = format!("\n{} {} | ", component.package.name, component.package.version);
+            assert_eq!(list.contains(&line), component.package.source.is_some(), "{line}");
         }
         for words in [
             "SIL OPEN FONT LICENSE Version 1.1",

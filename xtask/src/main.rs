@@ -1,8 +1,8 @@
 //! The project's commands: `cargo xtask serve | test | golden | fuzz | drill | check | strings | web | bench | dist | screenshot`.
 //!
-//! Each command installs or builds what it needs and says in one sentence what to do when it cannot. `serve` builds
-//! the server alone, the other commands the whole workspace; `sightline-features` gives both the same features, so
-//! that the large dependencies compile once.
+//! Each command installs or builds its prerequisites, or explains in one sentence why this is impossible. `serve` builds
+//! only the server, the other commands the whole workspace; `sightline-features` gives both the same features, so that the
+//! large dependencies compile once.
 
 mod cmd;
 mod web;
@@ -27,8 +27,8 @@ mod deny;
 mod bench;
 mod peers;
 mod remap;
-mod parts;
-mod bill;
+mod components;
+mod sbom;
 mod licences;
 mod dist;
 
@@ -45,7 +45,7 @@ struct Arguments {
     command: Task,
 }
 
-/// What can be done.
+/// The commands.
 #[derive(Subcommand)]
 enum Task {
     /// Build the page and the server and start it; it prints its address.
@@ -59,45 +59,45 @@ enum Task {
         /// Run only the tests whose names contain this.
         filter: Option<String>,
     },
-    /// Compare every number that tracking computes with the golden lists.
+    /// Compare every number computed by tracking with the golden lists.
     Golden {
-        /// Write the lists anew instead.
+        /// Record the lists again instead.
         #[arg(long)]
         update: bool,
     },
-    /// Search for inputs that break a parser of foreign bytes.
+    /// Search for inputs that make a parser of external data fail.
     Fuzz {
-        /// Search in this parser only; by default in each of them.
+        /// Search in this parser only; by default in all parsers.
         target: Option<String>,
-        /// How long to search in each, minutes.
+        /// Duration of the search in each parser, minutes.
         #[arg(long, default_value_t = 1.0)]
         minutes: f64,
     },
-    /// Run the program under load and in trouble, for about 20 minutes, and print what it held and lost as a table.
+    /// Test the program under load and with faults, for about 20 minutes, and print the results as a table.
     Drill,
-    /// Check format, lints (native and WASM), documentation, and the rules of the house and for dependencies.
+    /// Check format, lints (native and WASM), documentation, dependencies, and the project's own rules.
     Check,
-    /// List every text that users can see, one `file:line<TAB>text` a line.
+    /// List every text that users can see, one `file:line<TAB>text` per line.
     Strings {
         /// List only the texts of files whose path contains this.
         filter: Option<String>,
     },
-    /// Build what the browser loads into `target/web`.
+    /// Build the page with the viewer's WASM into `target/web`.
     Web,
     /// Run the benchmarks.
     Bench {
         /// Run only the benchmarks whose names contain this.
         filter: Option<String>,
-        /// Compare the correlation with OpenCV's instead, on the same pixels and in turn.
+        /// Compare correlation, features, matching and dense stereo with OpenCV instead, on the same pixels and in turn.
         #[arg(long, conflicts_with = "filter")]
         peers: bool,
-        /// Print the comparison as one JSON object a line.
+        /// Print the comparison as one JSON object per line.
         #[arg(long, requires = "peers")]
         json: bool,
     },
-    /// Build the program to hand out, with the viewer inside, its bill of materials and its licences, in `target/dist`.
+    /// Build the program for distribution, with the viewer inside, its bill of materials and its licences, in `target/dist`.
     Dist,
-    /// Take the picture in the README again.
+    /// Update the screenshot in the README.
     Screenshot,
 }
 
@@ -122,7 +122,7 @@ fn main() -> ExitCode {
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            // Standard error may be closed; the exit code still tells.
+            // Standard error may be closed; the exit code still reports the failure.
             writeln!(std::io::stderr(), "xtask: {error:#}").unwrap_or_default();
             ExitCode::FAILURE
         }

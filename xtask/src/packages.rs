@@ -8,13 +8,13 @@ use serde::Deserialize;
 
 use crate::{cmd, wasm_target};
 
-/// Advice for a Cargo that cannot list the packages.
+/// Advice if Cargo cannot list the packages.
 const MEND: &str = "mend what Cargo reports; if Cargo.lock is out of date, run `cargo metadata` once";
 
 /// Name and version of a package, such as `("serde", "1.0.229")`.
 pub(crate) type Name = (String, String);
 
-/// A package, with the fields of its manifest that licences and sources depend on.
+/// A package, with the manifest fields needed for licences and sources.
 #[derive(Clone, Debug, Default, Deserialize)]
 pub(crate) struct Package {
     pub(crate) id: String,
@@ -38,17 +38,17 @@ impl Package {
     }
 }
 
-/// A dependency as a manifest names it.
+/// A dependency in a manifest.
 #[derive(Clone, Debug, Default, Deserialize)]
 pub(crate) struct Requirement {
     pub(crate) name: String,
-    /// The versions that are accepted, such as `^1.2`.
+    /// The accepted versions, such as `^1.2`.
     pub(crate) req: String,
     /// The folder of a package of this workspace.
     pub(crate) path: Option<PathBuf>,
 }
 
-/// All packages, and which of them needs which others at run time.
+/// All packages, and their runtime dependencies.
 pub(crate) struct Packages {
     pub(crate) all: Vec<Package>,
     needs: BTreeMap<Name, BTreeSet<Name>>,
@@ -80,7 +80,7 @@ struct Edge {
 
 #[derive(Deserialize)]
 struct EdgeKind {
-    /// `None` for a dependency at run time, else `dev` or `build`.
+    /// `None` for a runtime dependency, else `dev` or `build`.
     kind: Option<String>,
 }
 
@@ -97,7 +97,7 @@ struct Locked {
 }
 
 impl Packages {
-    /// The packages for these compilation targets; with `features`, such as `--all-features`, those of optional ones.
+    /// The packages for these compilation targets; `features`, such as `--all-features`, adds optional ones.
     pub(crate) fn for_targets(targets: &[String], features: &[&str]) -> Result<Self> {
         let mut metadata = cmd::cargo(&["metadata", "--quiet", "--locked", "--format-version", "1"]);
         metadata.args(features);
@@ -124,41 +124,41 @@ impl Packages {
         Ok(Self { all, needs, checksums })
     }
 
-    /// The package of this name and version.
+    /// The package with this name and version.
     pub(crate) fn get(&self, name: &Name) -> Result<&Package> {
         let found = self.all.iter().find(|package| package.name == name.0 && package.version == name.1);
         found.with_context(|| format!("`cargo metadata` does not list {} {}", name.0, name.1))
     }
 
-    /// The packages that this one needs at run time.
+    /// The runtime dependencies of a package.
     pub(crate) fn needs(&self, name: &Name) -> impl Iterator<Item = &Name> {
         self.needs.get(name).into_iter().flatten()
     }
 
-    /// SHA-256 of the package's archive, hexadecimal; `None` for the workspace's own.
+    /// SHA-256 of the package's archive, hexadecimal; `None` for the workspace's own packages.
     pub(crate) fn checksum(&self, name: &Name) -> Option<&str> {
         self.checksums.get(name).map(String::as_str)
     }
 }
 
-/// The packages whose code is inside the native program.
+/// The packages linked into the native program.
 pub(crate) fn inside_program(target: &str) -> Result<BTreeSet<Name>> {
     linked("sightline-server", target)
 }
 
-/// The packages whose code is inside the page's WASM.
+/// The packages linked into the page's WASM.
 pub(crate) fn inside_page() -> Result<BTreeSet<Name>> {
     linked("sightline-viewer", wasm_target::TARGET)
 }
 
 /// The compilation target of this machine.
 pub(crate) fn host() -> Result<String> {
-    let said = cmd::output(cmd::rustc().arg("-vV"), "install Rust with rustup")?;
-    let host = said.lines().find_map(|line| line.strip_prefix("host: ")).map(str::to_owned);
+    let version_text = cmd::output(cmd::rustc().arg("-vV"), "install Rust with rustup")?;
+    let host = version_text.lines().find_map(|line| line.strip_prefix("host: ")).map(str::to_owned);
     host.context("`rustc -vV` names no host")
 }
 
-/// The packages that a build of this one links; macros and build scripts run during the build only.
+/// The packages that a build of `package` links, without macros and build scripts, which run only during the build.
 fn linked(package: &str, target: &str) -> Result<BTreeSet<Name>> {
     let mut tree = cmd::cargo(&["tree", "--quiet", "--locked", "--package", package, "--target", target]);
     tree.args(["--edges", "normal,no-proc-macro", "--prefix", "none", "--format", "{p}"]);
@@ -170,7 +170,7 @@ fn linked(package: &str, target: &str) -> Result<BTreeSet<Name>> {
     Ok(names)
 }
 
-/// Reads `serde v1.0.229` and `sightline-api v0.1.0 (/path)`.
+/// Parses `serde v1.0.229` and `sightline-api v0.1.0 (/path)`.
 fn name_and_version(line: &str) -> Option<Name> {
     let mut words = line.split_whitespace();
     Some((words.next()?.to_owned(), words.next()?.strip_prefix('v')?.to_owned()))

@@ -1,12 +1,13 @@
-//! `cargo xtask bench --peers`: our correlation, features, matches and dense stereo and OpenCV's, on the same pixels, in turn, in one run.
+//! `cargo xtask bench --peers`: compares our correlation, features, matching and dense stereo with OpenCV, on the same
+//! pixels, in turn, in one run.
 //!
 //! Both sides are programs that stay open and answer one line with another (`core/benches/peer.rs`,
-//! `xtask/peers/opencv.py`): a few repetitions of one work, of which the quickest counts. They are asked in turn, ours,
-//! theirs, ours, theirs, so that whatever else the machine does meets both; of the rounds the median is reported. Each
-//! side has one thread. What both find must agree before any time is shown: scores to 1e-4, the number of keypoints to
-//! 5 %, the nearest descriptors exactly, disparities to half a pixel.
+//! `xtask/peers/opencv.py`): they repeat one task a few times and report the shortest time. They are called alternately, so
+//! that other load on the machine affects both; the result is the median over the rounds. Each side uses one thread. The
+//! results of both must agree before any time is shown: scores to 1e-4, the number of keypoints to 5 %, the nearest
+//! descriptors exactly, disparities to half a pixel.
 //!
-//! OpenCV comes from PyPI into a virtual environment in the target folder, once.
+//! OpenCV is installed from PyPI into a virtual environment in the target folder, once.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -16,61 +17,61 @@ use anyhow::{Context, Result, bail};
 
 use crate::cmd;
 
-/// What is installed, exactly.
+/// The exact versions to install.
 const PACKAGES: [&str; 2] = ["numpy==2.4.6", "opencv-python-headless==5.0.0.93"];
 
-/// The names under which the other side is reported.
+/// The names of the OpenCV functions in the table.
 const CORRELATION: &str = "opencv matchTemplate(TM_CCOEFF_NORMED)";
 const FEATURES: &str = "opencv SIFT.detectAndCompute";
 const MATCHES: &str = "opencv BFMatcher(NORM_L2).knnMatch(k=2)";
 const STEREO: [(&str, &str); 2] = [("block", "opencv StereoBM(15)"), ("semi-global", "opencv StereoSGBM(5)")];
 
-/// How far two scores of one position may lie apart: OpenCV sums in single precision.
-const SCORES_APART: f64 = 1e-4;
+/// Tolerance of scores at one position: OpenCV sums in single precision.
+const SCORE_TOLERANCE: f64 = 1e-4;
 
-/// How far the numbers of keypoints may lie apart, as a share of them.
-const KEYPOINTS_APART: f64 = 0.05;
+/// Relative tolerance of the number of keypoints.
+const KEYPOINT_TOLERANCE: f64 = 0.05;
 
-/// How far distances of descriptors, the roots of whole numbers written with four digits, may lie apart.
-const DISTANCES_APART: f64 = 2e-4;
+/// Tolerance of descriptor distances, the square roots of integers written with four digits.
+const DISTANCE_TOLERANCE: f64 = 2e-4;
 
-/// How far disparities may lie apart, px.
-const DISPARITIES_APART: f64 = 0.5;
+/// Tolerance of disparities, px.
+const DISPARITY_TOLERANCE: f64 = 0.5;
 
-/// How often each side is asked for one work.
+/// Number of calls of each side per task.
 const ROUNDS: usize = 15;
 
-/// Sides of the images: two that are searched, and a scene whose features are looked for.
+/// Sides of the images, px: two for template matching, and a scene for features and stereo.
 const IMAGES: [u32; 2] = [161, 621];
 const SCENE: u32 = 1024;
 
-/// A template of a side over an image of `IMAGES`, so often in a row.
+/// Side of the template, index into `IMAGES`, and number of repetitions.
 const TEMPLATES: [(u32, usize, u32); 4] = [(11, 0, 20), (21, 0, 20), (31, 0, 20), (21, 1, 3)];
 
-/// Disparities that are searched in the scene and what a second eye sees of it.
+/// Number of disparities searched between the scene and its second view.
 const DISPARITIES: u32 = 128;
 
-/// Descriptors that are compared with as many others.
+/// Number of descriptors that are matched with as many others.
 const QUERIES: u32 = 2000;
 
-/// One work, as both sides are asked for it.
-struct Work {
+/// One task, as requested from both sides.
+struct Workload {
     name: String,
     request: String,
     peer: &'static str,
-    /// How far the numbers of both sides may lie apart: by themselves, and as a share of them.
-    apart: [f64; 2],
+    /// Absolute and relative tolerance of the numbers of both sides.
+    tolerance: [f64; 2],
 }
 
-/// The comparison of one work.
-struct Compared {
+/// The comparison of one task.
+struct Comparison {
     work: String,
     peer: &'static str,
     ours_ms: f64,
     peer_ms: f64,
 }
 
-/// Runs every work on both sides and prints a table, or with `json` one object a line.
+/// Runs every task on both sides and prints a table, or with `json` one object per line.
 pub(crate) fn peers(json: bool) -> Result<()> {
     let folder = cmd::target_dir().join("peers");
     std::fs::create_dir_all(&folder).context("the target folder cannot be written")?;
@@ -81,53 +82,53 @@ pub(crate) fn peers(json: bool) -> Result<()> {
     let script = cmd::root().join("xtask/peers/opencv.py");
     let mut peer = Side::start(Command::new(python).arg(script).arg(&pixels), "opencv.py")?;
     if !json {
-        cmd::say(format!(
+        cmd::print_line(format!(
             "{:<40} {:>10} {:>10} {:>7}   one thread each",
             "work", "ours ms", "peer ms", "ratio"
         ));
     }
     let descriptors = folder.join("descriptors.u8");
-    peer.ask(&format!("describe {} {} {}", IMAGES.len(), 2 * QUERIES, descriptors.display()))?;
-    for work in works(&descriptors.display().to_string()) {
+    peer.request(&format!("describe {} {} {}", IMAGES.len(), 2 * QUERIES, descriptors.display()))?;
+    for work in workloads(&descriptors.display().to_string()) {
         let compared = compare(work, &mut ours, &mut peer)?;
-        cmd::say(if json { compared.json() } else { compared.row() });
+        cmd::print_line(if json { compared.json() } else { compared.row() });
     }
     Ok(())
 }
 
-/// All works; `descriptors` is the file of those that are compared.
-fn works(descriptors: &str) -> Vec<Work> {
+/// All tasks; `descriptors` is the file with the descriptors to match.
+fn workloads(descriptors: &str) -> Vec<Workload> {
     let correlation = |(size, image, repetitions): (u32, usize, u32)| {
         let side = IMAGES[image];
-        Work {
+        Workload {
             name: format!("zncc {size}x{size} over {side}x{side}"),
             request: format!("zncc {image} {size} {} {} {repetitions}", side / 3, side / 4),
             peer: CORRELATION,
-            apart: [SCORES_APART, 0.0],
+            tolerance: [SCORE_TOLERANCE, 0.0],
         }
     };
-    let features = Work {
+    let features = Workload {
         name: format!("sift {SCENE}x{SCENE}"),
         request: format!("sift {} 1", IMAGES.len()),
         peer: FEATURES,
-        apart: [0.0, KEYPOINTS_APART],
+        tolerance: [0.0, KEYPOINT_TOLERANCE],
     };
-    let matches = Work {
+    let matches = Workload {
         name: format!("match {QUERIES}x{QUERIES} of sift"),
         request: format!("match {descriptors} {QUERIES} 3"),
         peer: MATCHES,
-        apart: [DISTANCES_APART, 0.0],
+        tolerance: [DISTANCE_TOLERANCE, 0.0],
     };
-    let stereo = STEREO.map(|(method, peer)| Work {
+    let stereo = STEREO.map(|(method, peer)| Workload {
         name: format!("dense stereo {method} {SCENE}x{SCENE}x{DISPARITIES}"),
         request: format!("stereo {method} {} {DISPARITIES} 1", IMAGES.len()),
         peer,
-        apart: [DISPARITIES_APART, 0.0],
+        tolerance: [DISPARITY_TOLERANCE, 0.0],
     });
     TEMPLATES.into_iter().map(correlation).chain([features, matches]).chain(stereo).collect()
 }
 
-impl Compared {
+impl Comparison {
     fn ratio(&self) -> f64 {
         self.peer_ms / self.ours_ms
     }
@@ -146,16 +147,16 @@ impl Compared {
     }
 }
 
-/// Asks both sides in turn.
-fn compare(work: Work, ours: &mut Side, peer: &mut Side) -> Result<Compared> {
-    let Work { name, request, peer: peer_name, apart: [absolute, share] } = work;
+/// Calls both sides alternately.
+fn compare(work: Workload, ours: &mut Side, peer: &mut Side) -> Result<Comparison> {
+    let Workload { name, request, peer: peer_name, tolerance: [absolute, share] } = work;
     let (mut our_times, mut peer_times) = (Vec::new(), Vec::new());
     for _ in 0..ROUNDS {
-        let (our_time, our_numbers) = ours.ask(&request)?;
-        let (peer_time, peer_numbers) = peer.ask(&request)?;
+        let (our_time, our_numbers) = ours.request(&request)?;
+        let (peer_time, peer_numbers) = peer.request(&request)?;
         let mut pairs = our_numbers.iter().zip(&peer_numbers);
-        let apart = pairs.find(|(a, b)| (*a - *b).abs() > absolute + share * b.abs());
-        if let Some((a, b)) = apart {
+        let mismatch = pairs.find(|(a, b)| (*a - *b).abs() > absolute + share * b.abs());
+        if let Some((a, b)) = mismatch {
             bail!("{name}: the two sides do not agree: {a} and {b}; mend this first");
         }
         if our_numbers.len() != peer_numbers.len() || our_numbers.is_empty() {
@@ -165,7 +166,7 @@ fn compare(work: Work, ours: &mut Side, peer: &mut Side) -> Result<Compared> {
         peer_times.push(peer_time);
     }
     let (ours_ms, peer_ms) = (1e3 * median(our_times), 1e3 * median(peer_times));
-    Ok(Compared { work: name, peer: peer_name, ours_ms, peer_ms })
+    Ok(Comparison { work: name, peer: peer_name, ours_ms, peer_ms })
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
@@ -173,7 +174,7 @@ fn median(mut values: Vec<f64>) -> f64 {
     values[values.len() / 2]
 }
 
-/// One side: a program that answers lines.
+/// One side: a program that answers requests line by line.
 struct Side {
     name: &'static str,
     child: Child,
@@ -193,12 +194,11 @@ impl Side {
         Ok(Self { name, child, requests, answers })
     }
 
-    /// Seconds, and what was found.
-    fn ask(&mut self, request: &str) -> Result<(f64, Vec<f64>)> {
+    /// Time in seconds, and the numbers of the answer.
+    fn request(&mut self, request: &str) -> Result<(f64, Vec<f64>)> {
         let mut line = String::new();
-        let asked = writeln!(self.requests, "{request}").and_then(|()| self.requests.flush());
-        asked
-            .and_then(|()| self.answers.read_line(&mut line))
+        let sent = writeln!(self.requests, "{request}").and_then(|()| self.requests.flush());
+        sent.and_then(|()| self.answers.read_line(&mut line))
             .with_context(|| format!("{} has ended early; its message stands above", self.name))?;
         let mut numbers = line.split_whitespace().map_while(|word| word.parse::<f64>().ok());
         let seconds = numbers
@@ -210,13 +210,13 @@ impl Side {
 
 impl Drop for Side {
     fn drop(&mut self) {
-        // It may have ended by itself; it must be gone afterwards.
+        // It may already have ended; it must be reaped in either case.
         self.child.kill().unwrap_or_default();
         drop(self.child.wait());
     }
 }
 
-/// The Python of a virtual environment that holds the packages.
+/// The Python of a virtual environment with the packages.
 fn environment(folder: &Path) -> Result<PathBuf> {
     let python = folder.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" });
     let stamp = folder.join("installed");
@@ -225,7 +225,7 @@ fn environment(folder: &Path) -> Result<PathBuf> {
     }
     let system = cmd::find_in_path(&["python3", "python"])
         .context("there is no python3; install it (Debian: python3-venv) and run this again")?;
-    cmd::say("Installing OpenCV from PyPI into the target folder, once.");
+    cmd::print_line("Installing OpenCV from PyPI into the target folder, once.");
     let mend = "install Python's venv (Debian: apt-get install python3-venv) and run this again";
     cmd::output(cmd::program(system).args(["-m", "venv", "--clear"]).arg(folder), mend)?;
     let mut install = cmd::program(&python);
@@ -235,7 +235,7 @@ fn environment(folder: &Path) -> Result<PathBuf> {
     Ok(python)
 }
 
-/// Builds our side in the profile that everything else is built in, and says where it is.
+/// Builds our side in the development profile, and returns its path.
 fn our_program() -> Result<PathBuf> {
     let arguments =
         ["bench", "--workspace", "--exclude", "xtask", "--bench", "peer", "--profile", "dev", "--no-run"];
@@ -246,7 +246,7 @@ fn our_program() -> Result<PathBuf> {
     executable(&messages).context("cargo built no bench `peer`; look at core/Cargo.toml")
 }
 
-/// The path in Cargo's message on the bench `peer`.
+/// The path in Cargo's message about the benchmark `peer`.
 fn executable(messages: &str) -> Option<PathBuf> {
     let message = messages
         .lines()
@@ -255,15 +255,15 @@ fn executable(messages: &str) -> Option<PathBuf> {
     Some(PathBuf::from(path.replace("\\\\", "\\")))
 }
 
-/// A number from 0 to 1 for each pixel, without repetition.
+/// A pseudo-random number from 0 to 1 for each pixel.
 fn hash(x: u32, y: u32) -> f64 {
     let mut h = x.wrapping_mul(0x9E37_79B1) ^ y.wrapping_mul(0x85EB_CA77);
     h = (h ^ (h >> 15)).wrapping_mul(0x2C1B_3C6D);
     f64::from(h ^ (h >> 13)) / f64::from(u32::MAX)
 }
 
-/// The squares that both sides read, always the same: hashed values smoothed by a 3 × 3 mean, the scene, and what
-/// a second eye sees of it: 16 to 101 px of disparity, more from the top down.
+/// The images for both sides, always the same: hashed values smoothed by a 3 × 3 mean, the scene, and its second view with
+/// 16 to 101 px of disparity, increasing from top to bottom.
 fn images() -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut add = |side: u32, value: &dyn Fn(u32, u32) -> f64| {
@@ -280,8 +280,8 @@ fn images() -> Vec<u8> {
     bytes
 }
 
-/// Hashed values between which is interpolated, every 4, 8 … 64 pixels, with some 6000 features; whole numbers of 255,
-/// because OpenCV looks for them in 8 bits.
+/// Interpolated hashed values at spacings of 4, 8 … 64 pixels, with some 6000 features; multiples of 1/255, because OpenCV
+/// detects features in 8 bits.
 fn scene(x: u32, y: u32) -> f64 {
     let noise = |spacing: u32| {
         let (u, v) = (f64::from(x % spacing), f64::from(y % spacing));
@@ -309,7 +309,7 @@ mod tests {
 
     #[test]
     fn a_comparison_reads_as_a_row_and_as_an_object() {
-        let compared = Compared {
+        let compared = Comparison {
             work: "zncc 21x21 over 161x161".to_owned(),
             peer: CORRELATION,
             ours_ms: 0.125,

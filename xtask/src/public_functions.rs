@@ -1,9 +1,8 @@
-//! Public functions that no other crate of the workspace names: `pub` without a caller outside hides dead code from the
-//! compiler.
+//! Finds public functions that no other crate of the workspace uses: `pub` without an external caller hides dead code from
+//! the compiler.
 //!
-//! A function is named by every identifier of another crate's sources that is equal to its name, so that functions with
-//! common names pass. `public_functions.txt` lists those that were there before this rule, as `package name`; it may
-//! only become shorter.
+//! A function counts as used if any identifier in another crate's sources equals its name, so functions with common names
+//! pass. `public_functions.txt` lists the exceptions that precede this rule, as `package name`; entries may only be removed.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -14,16 +13,16 @@ use syn::visit::{self, Visit};
 
 use crate::house_rules::{Finding, files, read};
 
-/// The functions that were there before the rule, beside this file's package.
+/// The list of functions that precede the rule.
 const KNOWN: &str = "xtask/public_functions.txt";
 
-/// Folders with packages whose functions are held to the rule.
+/// Folders with packages to which the rule applies.
 const HELD: [&str; 4] = ["core", "experiments", "server", "viewer"];
 
-/// Folders whose sources may name a function.
+/// Folders whose sources count as users.
 const NAMING: [&str; 7] = ["core", "experiments", "features", "server", "viewer", "tests", "xtask"];
 
-/// Where a public function is declared.
+/// The declaration of a public function.
 struct Declared {
     package: PathBuf,
     name: String,
@@ -31,10 +30,10 @@ struct Declared {
     line: usize,
 }
 
-/// Public functions without a caller outside that are not known, and known ones that are not there any more.
+/// Public functions without an external caller that are not listed, and listed ones that do not exist.
 ///
 /// # Errors
-/// A source that cannot be read or is no Rust.
+/// A source that cannot be read or parsed.
 pub(crate) fn findings(root: &Path) -> Result<Vec<Finding>> {
     let text = std::fs::read_to_string(root.join(KNOWN)).with_context(|| format!("{KNOWN} is missing"))?;
     let known: BTreeSet<&str> = text.lines().collect();
@@ -57,7 +56,7 @@ pub(crate) fn findings(root: &Path) -> Result<Vec<Finding>> {
     Ok(findings)
 }
 
-/// All public functions that no other crate names.
+/// All public functions that no other crate uses.
 fn unnamed(root: &Path) -> Result<Vec<Declared>> {
     let mut declared = Vec::new();
     let mut names: BTreeMap<PathBuf, BTreeSet<String>> = BTreeMap::new();
@@ -82,13 +81,13 @@ fn unnamed(root: &Path) -> Result<Vec<Declared>> {
     Ok(declared)
 }
 
-/// The nearest folder above a file that has a manifest.
+/// The nearest parent folder of a file with a manifest.
 fn package_of(root: &Path, file: &Path) -> PathBuf {
     let above = file.ancestors().skip(1).find(|folder| root.join(folder).join("Cargo.toml").is_file());
     above.unwrap_or(Path::new("")).to_owned()
 }
 
-/// True for a file of the package's library, false for its program, tests, benchmarks and build script.
+/// True for a file of the package's library; false for its program, tests, benchmarks and build script.
 fn is_of_library(package: &Path, file: &Path) -> bool {
     let source = package.join("src");
     let is_test = file.components().any(|part| part.as_os_str() == "tests")
@@ -109,7 +108,7 @@ fn identifiers(tokens: TokenStream, names: &mut BTreeSet<String>) {
     }
 }
 
-/// Collects functions and methods that are `pub`, those of tests left out.
+/// Collects `pub` functions and methods, except those of tests.
 struct PublicFunctions<'a> {
     package: &'a Path,
     file: &'a Path,

@@ -1,14 +1,14 @@
-//! Builds that do not depend on the folders in which they happen, nor on the time.
+//! Makes builds independent of their folders and of the time.
 //!
-//! Messages of panics and logs contain the paths of sources. The compilers write fixed names in place of the folders of
-//! this machine:
+//! Messages of panics and logs contain the paths of sources. The compilers replace the folders of this machine with fixed
+//! names:
 //!
 //! | folder | name |
 //! |---|---|
 //! | the workspace | `/sightline` |
 //! | Cargo's home, with the sources of the dependencies | `/cargo` |
 //! | the target folder, with the sources that build scripts write | `/target` |
-//! | the sources of the standard library, where they are installed | `/rustc/COMMIT` |
+//! | the sources of the standard library, if installed | `/rustc/COMMIT` |
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -20,18 +20,18 @@ use crate::cmd;
 /// A folder, and the name that replaces it.
 type Renamed = (PathBuf, String);
 
-/// What makes C sources that name the time of their compilation (mimalloc's) the same at any time.
+/// Options that fix the compilation time in C sources that contain it (mimalloc's).
 const WITHOUT_TIME: [&str; 3] =
     ["-Wno-builtin-macro-redefined", "-D__DATE__=\"none\"", "-D__TIME__=\"none\""];
 
-/// Makes a Cargo command that builds into `target_dir` leave this machine's folders out of its results.
+/// Configures a Cargo command that builds into `target_dir` to omit this machine's folders from its results.
 ///
 /// The options replace those of `RUSTFLAGS` and of Cargo's configuration.
 pub(crate) fn apply(cargo: &mut Command, target_dir: &Path) -> Result<()> {
     let renamed = folders(target_dir)?;
     let options: Vec<_> = renamed.iter().map(|pair| option("--remap-path-prefix", pair)).collect();
     cargo.env("CARGO_ENCODED_RUSTFLAGS", options.join("\u{1f}"));
-    // `CFLAGS` is a list that spaces separate.
+    // `CFLAGS` is separated by spaces.
     let of_c = renamed.iter().map(|pair| option("-ffile-prefix-map", pair));
     let of_c = of_c.filter(|option| !option.contains(' ')).chain(WITHOUT_TIME.map(str::to_owned));
     cargo.env("CFLAGS", of_c.collect::<Vec<_>>().join(" "));
@@ -42,12 +42,13 @@ fn option(name: &str, (folder, named): &Renamed) -> String {
     format!("{name}={}={named}", folder.display())
 }
 
-/// The folders; the compiler takes the last one that contains a path.
+/// The folders; the compiler uses the last one that contains a path.
 fn folders(target_dir: &Path) -> Result<Vec<Renamed>> {
     let mend = "install Rust with rustup";
     let sysroot = cmd::output(cmd::rustc().args(["--print", "sysroot"]), mend)?;
-    let said = cmd::output(cmd::rustc().arg("-vV"), mend)?;
-    let commit = said.lines().find_map(|line| line.strip_prefix("commit-hash: ")).unwrap_or("unknown");
+    let version_text = cmd::output(cmd::rustc().arg("-vV"), mend)?;
+    let commit =
+        version_text.lines().find_map(|line| line.strip_prefix("commit-hash: ")).unwrap_or("unknown");
     Ok(vec![
         (cmd::root(), "/sightline".to_owned()),
         (cargo_home()?, "/cargo".to_owned()),

@@ -1,4 +1,4 @@
-//! `cargo xtask serve`: builds what changed, then becomes the server.
+//! `cargo xtask serve`: builds what changed, then runs the server.
 
 use std::process::Command;
 
@@ -7,7 +7,7 @@ use anyhow::Result;
 use crate::build::{self, Build};
 use crate::{cmd, web};
 
-/// Builds the page and the server at the same time, then runs `sightline serve` in this process's place.
+/// Builds the page and the server concurrently, then replaces this process by `sightline serve`.
 pub(crate) fn serve(arguments: &[String]) -> Result<()> {
     build_all()?;
     let mut server = cmd::program(cmd::sightline_binary());
@@ -15,7 +15,7 @@ pub(crate) fn serve(arguments: &[String]) -> Result<()> {
     become_program(server)
 }
 
-/// Builds the page and the program `sightline`, and nothing else.
+/// Builds only the page and the program `sightline`.
 pub(crate) fn build_all() -> Result<()> {
     // The server's build script reads this folder, which a fresh clone does not have.
     std::fs::create_dir_all(web::output_dir())?;
@@ -24,8 +24,8 @@ pub(crate) fn build_all() -> Result<()> {
 
 /// The build of the program `sightline`.
 ///
-/// `sightline-features` gives it the dependencies' features of the whole workspace, so that `cargo test` compiles
-/// none of them again.
+/// `sightline-features` gives it the dependency features of the whole workspace, so that `cargo test` does not recompile the
+/// dependencies.
 fn program() -> Build {
     Build {
         name: "server",
@@ -43,7 +43,7 @@ fn become_program(mut command: Command) -> Result<()> {
     Err(anyhow::Error::new(error).context("target/debug/sightline cannot be started; build it again"))
 }
 
-/// Runs the program and waits, where a process cannot be replaced.
+/// Runs the program and waits, on systems that cannot replace a process.
 #[cfg(not(unix))]
 fn become_program(mut command: Command) -> Result<()> {
     cmd::run(&mut command, "read what the server says above")

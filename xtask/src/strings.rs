@@ -1,8 +1,8 @@
-//! `cargo xtask strings`: lists the texts that a user can see, read from the sources, one `file:line<TAB>text` a line.
+//! `cargo xtask strings`: lists the texts that users can see, read from the sources, one `file:line<TAB>text` per line.
 //!
-//! Texts are string literals (also those inside macros), the help of the command line and of settings (doc comments), the
-//! descriptions of scenarios, and the text of the page's HTML. Left out are tests, panics, keys and identifiers, scripts
-//! and markup. For reviewers of the language, and for the rule that no such text quotes a requirement by its number.
+//! Texts are string literals (including those inside macros), the help of the command line and of settings (doc comments),
+//! the descriptions of scenarios, and the text of the page's HTML. Tests, panics, keys and identifiers, scripts and markup
+//! are excluded. The list is for language reviews, and for the rule that no such text cites a requirement number.
 
 mod sources;
 mod text;
@@ -18,10 +18,10 @@ use crate::house_rules::{Finding, files, read};
 use sources::{folder_of_modules, is_of_tests};
 use text::{is_for_users, quotes_requirement, texts_of_page};
 
-/// Folders of crates without a text for users.
+/// Folders of crates without user-visible texts.
 const SILENT: [&str; 4] = ["core/benches", "core/sources", "core/testing", "core/tests"];
 
-/// Macros whose texts only a developer reads.
+/// Macros whose texts are for developers only.
 const OF_DEVELOPERS: [&str; 17] = [
     "assert",
     "assert_eq",
@@ -42,16 +42,16 @@ const OF_DEVELOPERS: [&str; 17] = [
     "unreachable",
 ];
 
-/// Attributes with texts for users.
+/// Attributes with user-visible texts.
 const SHOWN_ATTRIBUTES: [&str; 5] = ["arg", "clap", "command", "error", "value"];
 
 /// Derived traits that turn doc comments into help.
 const HELP_TRAITS: [&str; 4] = ["Args", "Parser", "Subcommand", "ValueEnum"];
 
-/// The folder with the scenarios of the library; their descriptions are shown.
+/// The folder with the scenarios of the library, whose descriptions are user-visible.
 const SCENARIOS: &str = "core/world/src/library";
 
-/// A text that a user can see.
+/// A user-visible text.
 #[derive(Debug, PartialEq)]
 struct Text {
     file: PathBuf,
@@ -62,21 +62,21 @@ struct Text {
 /// Prints all texts of files whose path contains `filter`.
 ///
 /// # Errors
-/// A source that cannot be read or is no Rust.
+/// A source that cannot be read or parsed.
 pub(crate) fn strings(filter: Option<&str>) -> Result<()> {
     for Text { file, line, text } in texts(&cmd::root())? {
         let file = file.display().to_string();
         if filter.is_none_or(|part| file.contains(part)) {
-            cmd::say(format!("{file}:{line}\t{}", text.replace('\n', "\\n").replace('\t', "\\t")));
+            cmd::print_line(format!("{file}:{line}\t{}", text.replace('\n', "\\n").replace('\t', "\\t")));
         }
     }
     Ok(())
 }
 
-/// Texts that quote a requirement by its number.
+/// Texts that cite a requirement number.
 ///
 /// # Errors
-/// A source that cannot be read or is no Rust.
+/// A source that cannot be read or parsed.
 pub(crate) fn findings(root: &Path) -> Result<Vec<Finding>> {
     let numbered = texts(root)?.into_iter().filter(|text| quotes_requirement(&text.text));
     let found = numbered.map(|Text { file, line, text }| {
@@ -126,11 +126,11 @@ fn texts(root: &Path) -> Result<Vec<Text>> {
     Ok(found)
 }
 
-/// Whether doc comments are texts for users.
+/// Whether doc comments are user-visible texts.
 #[derive(Clone, Copy, PartialEq)]
 enum Docs {
     Hidden,
-    /// Inside the braces of the group alone, as in `settings_group!`.
+    /// Only inside the braces of the group, as in `settings_group!`.
     Inside,
     Shown,
 }
@@ -139,7 +139,7 @@ enum Docs {
 #[derive(Default)]
 struct Reader {
     found: Vec<(usize, String)>,
-    /// Names of modules that are compiled for tests only.
+    /// Names of modules that are compiled only for tests.
     test_modules: Vec<String>,
 }
 
@@ -202,7 +202,7 @@ impl Reader {
         }
     }
 
-    /// Skips an item for tests; returns the index after it.
+    /// Skips a test item; returns the index after it.
     fn skip_item(&mut self, tokens: &[TokenTree], from: usize) -> usize {
         let is_word = |at: usize, words: &[&str]| matches!(tokens.get(at), Some(TokenTree::Ident(name)) if words.contains(&name.to_string().as_str()));
         let mut at = from;
@@ -229,7 +229,7 @@ impl Reader {
         at
     }
 
-    /// Adds doc comments, the lines of each paragraph joined.
+    /// Adds doc comments, with the lines of each paragraph joined.
     fn paragraphs(&mut self, docs: Vec<(usize, String)>) {
         let mut paragraph: Option<(usize, String)> = None;
         for (line, text) in docs {

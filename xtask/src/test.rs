@@ -1,4 +1,4 @@
-//! `cargo xtask test` and `cargo xtask screenshot`: everything built, then tested, in a browser too.
+//! `cargo xtask test` and `cargo xtask screenshot`: builds everything, then runs the tests, including those in a browser.
 
 use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader};
@@ -34,7 +34,7 @@ pub(crate) fn test(filter: Option<&str>) -> Result<()> {
     }
     let left_out = read_left_out(&left_out)?;
     for line in closing_lines(&count, &left_out) {
-        cmd::say(line);
+        cmd::print_line(line);
     }
     Ok(())
 }
@@ -56,7 +56,7 @@ fn read_left_out(file: &Path) -> Result<BTreeSet<String>> {
     Ok(noted.lines().map(str::to_owned).collect())
 }
 
-/// The result: the tests without data, which the test harness counts as passed, and the totals.
+/// The closing lines: tests without data, which the test harness counts as passed, and the totals.
 fn closing_lines(count: &Count, left_out: &BTreeSet<String>) -> Vec<String> {
     let number = left_out.len() as u64;
     let mut lines = Vec::new();
@@ -70,7 +70,7 @@ fn closing_lines(count: &Count, left_out: &BTreeSet<String>) -> Vec<String> {
     lines
 }
 
-/// Runs the test that takes the README's picture.
+/// Runs the test that takes the screenshot for the README.
 pub(crate) fn screenshot() -> Result<()> {
     let browser = prepare()?;
     let picture = cmd::root().join("docs").join("sightline.png");
@@ -87,7 +87,7 @@ pub(crate) fn screenshot() -> Result<()> {
             "no picture was taken: a test in tests/all named `…screenshot…` must write SIGHTLINE_SCREENSHOT's file"
         );
     }
-    cmd::say(format!("The picture is {}.", picture.display()));
+    cmd::print_line(format!("The picture is {}.", picture.display()));
     Ok(())
 }
 
@@ -98,7 +98,7 @@ fn prepare() -> Result<chromium::Browser> {
     Ok(browser)
 }
 
-/// Tells the tests where the programs are.
+/// Sets the paths of the programs for the tests.
 fn name_programs(command: &mut Command, browser: &chromium::Browser) {
     command
         .env("SIGHTLINE_CHROMIUM", &browser.chromium)
@@ -106,7 +106,7 @@ fn name_programs(command: &mut Command, browser: &chromium::Browser) {
         .env("SIGHTLINE_BIN", cmd::sightline_binary());
 }
 
-/// How many tests ended in which way.
+/// Numbers of passed and ignored tests.
 #[derive(Default, Debug, PartialEq)]
 pub(crate) struct Count {
     passed: u64,
@@ -119,12 +119,12 @@ impl Count {
         self.ignored += other.ignored;
     }
 
-    /// The numbers in words.
+    /// The numbers as text.
     pub(crate) fn shown(&self) -> String {
         format!("{} tests passed, {} ignored.", self.passed, self.ignored)
     }
 
-    /// Reads a summary line such as `test result: ok. 3 passed; 0 failed; 1 ignored; …`.
+    /// Parses a summary line such as `test result: ok. 3 passed; 0 failed; 1 ignored; …`.
     fn from_summary(line: &str) -> Option<Self> {
         let rest = line.strip_prefix("test result: ")?;
         let number_of = |word: &str| {
@@ -135,14 +135,14 @@ impl Count {
     }
 }
 
-/// Runs `cargo test`, showing its output as it comes, and counts what ran.
+/// Runs `cargo test`, forwards its output, and counts the tests.
 ///
-/// A filter that matches nothing ends well for Cargo; counting is what keeps a misspelt one from passing.
+/// Cargo succeeds if a filter matches no test; the count reveals a misspelt one.
 pub(crate) fn run_and_count(command: &mut Command) -> Result<Count> {
     run_and_read(command, |_| ())
 }
 
-/// The same, with a reader of each line.
+/// The same, calling `read` for each line.
 pub(crate) fn run_and_read(command: &mut Command, mut read: impl FnMut(&str)) -> Result<Count> {
     let mend = "mend the tests reported above";
     let mut child =
@@ -152,7 +152,7 @@ pub(crate) fn run_and_read(command: &mut Command, mut read: impl FnMut(&str)) ->
     for line in BufReader::new(output).split(b'\n') {
         let line = line.context("cargo's output cannot be read; run the command again")?;
         let line = String::from_utf8_lossy(&line);
-        cmd::say(&line);
+        cmd::print_line(&line);
         read(&line);
         if let Some(summary) = Count::from_summary(&line) {
             count.add(summary);

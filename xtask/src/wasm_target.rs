@@ -1,7 +1,7 @@
-//! The standard library for WASM: installed with the compiler, or by `rustup`.
+//! The standard library for WASM: installed with the toolchain, or by `rustup`.
 //!
-//! `rust-toolchain.toml` names the target, so `rustup` installs it with the toolchain. A toolchain that is older than
-//! the file lacks it, and `rustup` does not complete it where `RUSTUP_AUTO_INSTALL=0`.
+//! `rust-toolchain.toml` names the target, so `rustup` installs it with the toolchain. A toolchain that is older than the
+//! file lacks it, and `rustup` does not add it if `RUSTUP_AUTO_INSTALL=0`.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use anyhow::Result;
 
 use crate::cmd;
 
-/// The target of the viewer in the browser.
+/// The compilation target of the viewer in the browser.
 pub(crate) const TARGET: &str = "wasm32-unknown-unknown";
 
 /// Installs the standard library for [`TARGET`] if the compiler lacks it.
@@ -18,7 +18,7 @@ pub(crate) fn ensure() -> Result<()> {
     if is_installed(Path::new(sysroot.trim())) {
         return Ok(());
     }
-    cmd::say(format!("Installing the Rust target {TARGET}."));
+    cmd::print_line(format!("Installing the Rust target {TARGET}."));
     cmd::run(
         cmd::program("rustup").args(["target", "add", TARGET]),
         "install the Rust standard library for wasm32-unknown-unknown with your package manager",

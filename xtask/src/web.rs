@@ -14,7 +14,7 @@ use wasm_bindgen_cli_support::Bindgen;
 use crate::build::{self, Build};
 use crate::{cmd, remap, wasm_target};
 
-/// The folder from which the server serves, or embeds, the page.
+/// The folder from which the server serves or embeds the page.
 pub(crate) fn output_dir() -> PathBuf {
     cmd::root().join("target").join("web")
 }
@@ -24,7 +24,7 @@ pub(crate) fn web() -> Result<()> {
     build::run(vec![build()?])
 }
 
-/// The build of the viewer's WASM and, after it, of the page.
+/// The build of the viewer's WASM, followed by that of the page.
 pub(crate) fn build() -> Result<Build> {
     wasm_target::ensure()?;
     let mut command = viewer_cargo("build")?;
@@ -34,7 +34,7 @@ pub(crate) fn build() -> Result<Build> {
     Ok(Build { name: "page", command, tree, then: pack })
 }
 
-/// Writes the page from the viewer's WASM.
+/// Writes the page for the viewer's WASM.
 fn pack() -> Result<()> {
     let wasm =
         cmd::root().join("target/viewer").join(wasm_target::TARGET).join("viewer/sightline_viewer.wasm");
@@ -46,13 +46,15 @@ fn pack() -> Result<()> {
     let bytes = std::fs::metadata(output.join("sightline_viewer_bg.wasm"))?.len();
     let sent = std::fs::metadata(output.join("sightline_viewer_bg.wasm.gz"))?.len();
     let (bytes, sent) = (bytes as f64 / 1e6, sent as f64 / 1e6);
-    cmd::say(format!("The page is in target/web; its WASM has {bytes:.1} MB, {sent:.1} MB compressed."));
+    cmd::print_line(format!(
+        "The page is in target/web; its WASM has {bytes:.1} MB, {sent:.1} MB compressed."
+    ));
     Ok(())
 }
 
-/// Writes beside every file what is sent to browsers that take it compressed, where that is missing or of other contents.
+/// Writes a compressed version of every file for browsers that accept it, if it is missing or outdated.
 ///
-/// It is told by the contents: file times are as coarse as the clock's ticks, and two builds may fall into one.
+/// Compares the contents, because two builds may have the same file time.
 fn compress(output: &Path) -> Result<()> {
     for entry in std::fs::read_dir(output).with_context(|| format!("{} cannot be read", output.display()))? {
         let file = entry?.path();
@@ -73,17 +75,17 @@ fn compress(output: &Path) -> Result<()> {
     Ok(())
 }
 
-/// What a compressed file holds.
+/// Decompresses a file.
 fn unpack(packed: &Path) -> std::io::Result<Vec<u8>> {
     let mut content = Vec::new();
     GzDecoder::new(std::fs::File::open(packed)?).read_to_end(&mut content)?;
     Ok(content)
 }
 
-/// A Cargo command for the viewer in the browser, with a directory and a profile of its own.
+/// A Cargo command for the viewer in the browser, with its own target directory and profile.
 ///
-/// The native crates are compiled with other features and flags; apart, neither ever makes the other compile again.
-/// The folders of this machine are left out at each build, so that the page to hand out is compiled only once.
+/// The native crates use other features and flags; separate directories prevent either from recompiling the other. The
+/// folders of this machine are remapped in every build, so that the distributed page is compiled only once.
 pub(crate) fn viewer_cargo(task: &str) -> Result<Command> {
     let target_dir = cmd::root().join("target/viewer");
     let mut cargo = cmd::cargo(&[task, "--target", wasm_target::TARGET, "--target-dir", "target/viewer"]);
@@ -92,7 +94,7 @@ pub(crate) fn viewer_cargo(task: &str) -> Result<Command> {
     Ok(cargo)
 }
 
-/// Writes the JavaScript bindings and the WASM that goes with them, unless they are those of this build already.
+/// Writes the JavaScript bindings and the matching WASM, unless they are up to date.
 fn bind(wasm: &Path, output: &Path) -> Result<()> {
     let described = describe(wasm)?;
     let note = cmd::root().join("target/viewer/bound");
@@ -111,7 +113,7 @@ fn bind(wasm: &Path, output: &Path) -> Result<()> {
     std::fs::write(&note, described).with_context(|| format!("{} cannot be written", note.display()))
 }
 
-/// What tells one build of the viewer from another without reading it.
+/// A fingerprint of a build of the viewer, without reading it.
 fn describe(wasm: &Path) -> Result<String> {
     let metadata = std::fs::metadata(wasm)
         .with_context(|| format!("Cargo left no {}; mend the viewer", wasm.display()))?;
@@ -139,9 +141,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_sent_compressed_follows_what_it_was_made_of() {
+    fn compressed_files_follow_their_sources() {
         let output = tempfile::tempdir().expect("a temporary folder");
-        // Written within one tick of the clock as often as not.
+        // Both are often written within one tick of the clock.
         for text in ["one ".repeat(1000), "two".to_owned()] {
             std::fs::write(output.path().join("a.js"), &text).expect("a file");
             compress(output.path()).expect("compressed");

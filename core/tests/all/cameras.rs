@@ -1,4 +1,4 @@
-//! Several cameras a stop: rendered for themselves, tracked in for themselves, and missing at a stop without harm.
+//! Several cameras per stop: each is rendered and tracked independently, and may be missing at a stop.
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -30,7 +30,7 @@ fn further(text: &str, rig: CameraRig, image_size: u32) -> FurtherRig {
     FurtherRig { name: name(text), rig, look_deg: None, image_size }
 }
 
-/// A short approach with a pair of hazcams and one of pancams beside the navcams.
+/// A short approach with a pair of hazcams and one of pancams in addition to the navcams.
 fn scenario() -> Scenario {
     let mut scenario = library::scenario("approach-5").unwrap();
     (scenario.camera.image_size, scenario.camera.samples_per_axis) = (256, 1);
@@ -47,7 +47,7 @@ fn made(scenario: &Scenario, folder: &Path) -> Traverse {
     create_simulated(scenario, folder).unwrap()
 }
 
-/// The target of the scenario's rule that the mast looks at, so that the pancams see it to the end: site frame, m.
+/// The target of the scenario's rule at which the mast points, so that the pancams see it to the end: site frame, m.
 fn target_in_site(traverse: &Traverse, scenario: &Scenario) -> Point3 {
     let pixels = choose_targets(traverse.world().unwrap(), scenario, traverse.index());
     let centre = traverse.left_camera(0).centre_pixel();
@@ -55,7 +55,7 @@ fn target_in_site(traverse: &Traverse, scenario: &Scenario) -> Point3 {
     traverse.surface_point_in_site(0, None, *pixel).unwrap()
 }
 
-/// The designation of a true point in a pair.
+/// The designation of a true point in the images of a pair.
 fn designation(traverse: &Traverse, step: usize, camera: CameraName, point_in_site: Point3) -> Designation {
     let pose = traverse.true_site_from_rover(step).unwrap();
     let in_rover = pose.inverse_transform_point(&point_in_site);
@@ -65,7 +65,7 @@ fn designation(traverse: &Traverse, step: usize, camera: CameraName, point_in_si
 }
 
 #[test]
-fn further_images_are_rendered_when_asked_for_and_equal_those_of_their_rig() {
+fn further_images_are_rendered_on_demand_like_their_rig() {
     let folder = tempfile::tempdir().unwrap();
     let mut scenario = scenario();
     scenario.camera.further.push(further("twin", CameraRig::MerNavcam, 256));
@@ -73,10 +73,10 @@ fn further_images_are_rendered_when_asked_for_and_equal_those_of_their_rig() {
     let main = traverse.capture(1).unwrap();
     assert_eq!(traverse.rendered_count(), 2, "the main pair alone");
     assert!(!traverse.is_rendered(1, Some(name("pancam"))));
-    // The same rig at the same place takes the same images, noise included.
+    // The same rig at the same position has the same images, noise included.
     let capture = |camera: &str| traverse.capture_pair(1, Some(name(camera)), &NEVER).unwrap();
     assert_eq!(capture("twin"), main);
-    // As the library's function renders it for the true camera, exposed for its own first picture.
+    // Compared with the library's function for the true camera, exposed for its own first image.
     let (pancam, hazcam) = (capture("pancam"), capture("front_hazcam"));
     for (camera, rig, pair) in
         [("pancam", CameraRig::MerPancam, &pancam), ("front_hazcam", CameraRig::MerFrontHazcam, &hazcam)]
@@ -91,7 +91,7 @@ fn further_images_are_rendered_when_asked_for_and_equal_those_of_their_rig() {
         let mean = |image: &sightline_vision::image::GrayImage| {
             image.as_raw().iter().copied().map(f64::from).sum::<f64>() / image.as_raw().len() as f64
         };
-        // The expected picture has the exposure of the navcams: the shapes agree, the level is the camera's own.
+        // The expected image has the exposure of the navcams: they are equal up to the exposure of the camera.
         let ratio = mean(&pair.left) / mean(&expected);
         let differing = pair.left.as_raw().iter().zip(expected.as_raw());
         let largest =
@@ -102,7 +102,8 @@ fn further_images_are_rendered_when_asked_for_and_equal_those_of_their_rig() {
             "{camera}: exposure ratio {ratio:.3}, largest difference {largest:.4}, mean {:.4}",
             mean(&first.left)
         );
-        // A fisheye's rays of the coarse meter reach the sky; the mean of the whole picture is the wanted one.
+        // Rays of the fisheye reach the sky in the coarse exposure metering; the mean of the whole image is the requested
+        // one.
         assert!((mean(&first.left) - scenario.camera.mean_level).abs() < 0.03, "{camera}");
     }
     let told = traverse.index().stops[1].mast_angles;
@@ -128,14 +129,14 @@ fn a_target_is_tracked_in_the_pair_in_which_it_was_designated() {
     let (folder, scenario) = (tempfile::tempdir().unwrap(), scenario());
     let traverse = made(&scenario, folder.path());
     let point = target_in_site(&traverse, &scenario);
-    // Tolerances: a tenth of a pixel of disparity, at 10 m in the pancams and at 3.5 m in the hazcams, which see less.
+    // Tolerances: 0.1 px of disparity, at 10 m for the pancams and at 3.5 m for the hazcams, whose resolution is lower.
     let near = (0..traverse.stop_count())
         .find(|&step| (traverse.true_site_from_rover(step).unwrap().inverse() * point).coords.norm() < 3.5);
     for (camera, from, tolerance_m) in [("pancam", 0, 0.037), ("front_hazcam", near.unwrap(), 0.054)] {
         let designation = designation(&traverse, from, name(camera), point);
         let steps = track::run(&traverse, designation, &Settings::default()).unwrap();
         println!("{camera}: {:?}", summary(&steps));
-        // The target leaves the narrow picture of the pancams as the rover comes nearer: the template then does not fit any more.
+        // The target leaves the narrow field of view of the pancams at a shorter range, where the template no longer fits.
         let is_inside = |step: &&RunStep| {
             let size = f64::from(step.point_mast.left.width());
             let pixel = step.truth.as_ref().and_then(|truth| truth.left_pixel);
@@ -150,11 +151,11 @@ fn a_target_is_tracked_in_the_pair_in_which_it_was_designated() {
             let size = [step.point_mast.left.width(), step.capture().unwrap().left_size[0]];
             let wide = if camera == "pancam" { 256 } else { 512 };
             assert_eq!(size, [wide; 2]);
-            // Cameras on the body have no mast whose pointing could err.
+            // Cameras on the body have no mast with a pointing error.
             assert_eq!(step.point_mast.used.is_some(), camera == "pancam");
             assert_eq!(step.point_mast.error_covariance_in_rover.is_some(), camera == "pancam");
         }
-        // What is serialised names the pair, and an older form without it means the main pair.
+        // The serialised form names the pair; an older form without a name means the main pair.
         let json = serde_json::to_value(steps[0].update.target.designation).unwrap();
         assert_eq!(json["camera"], camera);
     }
@@ -168,7 +169,7 @@ fn targets_of_different_pairs_share_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let mut scenario = scenario();
     scenario.camera.further = vec![further("pancam", CameraRig::MerPancam, 256)];
-    // Both pairs have images of one size, so that nothing but the store tells their features apart.
+    // Both pairs have images of one size, so that only the store can separate their features.
     let traverse = made(&scenario, folder.path());
     let point = target_in_site(&traverse, &scenario);
     let features = preset("features").unwrap().settings().unwrap();
@@ -196,7 +197,7 @@ fn designation_in_main(traverse: &Traverse, point_in_site: Point3) -> Designatio
 }
 
 #[test]
-fn a_stop_without_the_pair_says_so_and_tracking_goes_on_behind_it() {
+fn tracking_continues_after_a_stop_without_the_pair() {
     let (folder, scenario) = (tempfile::tempdir().unwrap(), scenario());
     let whole = made(&scenario, folder.path());
     let point = target_in_site(&whole, &scenario);
@@ -218,7 +219,7 @@ fn a_stop_without_the_pair_says_so_and_tracking_goes_on_behind_it() {
     for step in &steps[2..4] {
         assert_eq!(step.update.state, TrackingState::Tracking, "it does not count as a loss");
         assert_eq!((step.point_mast.predicted_left, step.point_mast.used), (None, None));
-        // Everything that is computed of a step copes with it.
+        // All functions of a step accept it.
         assert!(serde_json::to_string(step).is_ok() && step.row().left_pixel.is_none());
     }
     assert!(steps[2].truth.is_none() && steps[4].truth.as_ref().unwrap().tracked == Some(true));
@@ -241,13 +242,13 @@ fn a_stop_without_the_pair_says_so_and_tracking_goes_on_behind_it() {
 }
 
 #[test]
-fn a_drive_to_a_target_of_the_pancams_points_the_mast_for_the_main_pair() {
+fn a_pancam_target_points_the_mast_for_the_main_pair() {
     let folder = tempfile::tempdir().unwrap();
     let scenario = scenario();
     let world = DrivenTraverse::begin(&scenario, &folder.path().join("a"), Cancel::default()).unwrap();
     let point = target_in_site(world.traverse(), &scenario);
     let target = designation(world.traverse(), 0, name("pancam"), point);
-    // Visual odometry would look at the main pair.
+    // Visual odometry would use the main pair.
     let odometry = OdometryMode::Off;
     let command = DriveCommand { standoff_m: 2.0, tolerance_m: 0.02, odometry, ..DriveCommand::default() };
     let settings = Settings::default();
@@ -258,16 +259,16 @@ fn a_drive_to_a_target_of_the_pancams_points_the_mast_for_the_main_pair() {
     for step in &drive.steps[1..] {
         assert_eq!(step.update.state, TrackingState::Tracking);
         assert!(step.truth.as_ref().unwrap().err_m < 0.03);
-        // The main pair was not rendered: nothing but the pancams was looked at.
+        // The main pair was not rendered: only the pancams were used.
         assert!(!drive.world.traverse().is_rendered(step.step, None));
         let (left, _) = sightline_rover::pipeline::Stops::cameras(drive.world.traverse(), step.step);
         let predicted = step.prediction().unwrap().position_in_rover;
         assert!(left.project(&predicted).unwrap().distance(left.centre_pixel()) < 1e-6);
     }
-    // A branch takes the images along.
+    // A branch copies the images.
     let branch = drive.world.branch(2, &[], &folder.path().join("b"), Cancel::default()).unwrap();
     assert!(branch.traverse().is_rendered(1, Some(name("pancam"))));
-    // Another state forgets them.
+    // Restoring another state deletes them.
     let first = drive.world.state()[..1].to_vec();
     drive.world.restore(first).unwrap();
     let left_over = folder.path().join("a/images/pancam_left_0001.png");

@@ -1,4 +1,4 @@
-//! The three ways to name a target lead to the same target.
+//! The three ways to designate a target give the same target.
 
 use sightline_geometry::camera::MastAngles;
 use sightline_geometry::frames::Pixel;
@@ -9,7 +9,7 @@ use sightline_session::track;
 use sightline_testing::PlaneWorld;
 use sightline_track::settings::Settings;
 
-/// A drive whose second stop stands 1 m ahead and 0.2 m to the right.
+/// A drive whose second stop is 1 m ahead and 0.2 m to the right.
 fn world() -> PlaneWorld {
     PlaneWorld::new(vec![Pose::identity(), Pose::translation(1.0, 0.2, 0.0)])
 }
@@ -40,7 +40,7 @@ fn the_three_ways_name_one_pixel_and_lead_to_one_point() {
 }
 
 #[test]
-fn a_point_beside_the_surface_says_how_far() {
+fn a_point_off_the_surface_is_reported_with_its_distance() {
     let world = world();
     // Half a metre before the plane, on the optical axis of the left camera.
     let point = Place { point_in_rover: Some([7.5, -0.1, -1.2]), ..Place::default() };
@@ -50,7 +50,7 @@ fn a_point_beside_the_surface_says_how_far() {
 }
 
 #[test]
-fn what_cannot_be_named_is_refused_in_one_sentence() {
+fn invalid_points_are_rejected_in_one_sentence() {
     let pixel = Some(Pixel::new(10.0, 10.0));
     let angles = Some(MastAngles { azimuth_rad: 0.3, elevation_rad: 0.0 });
     let both = Place { pixel, point_in_site: Some([8.0, 0.0, 0.0]), ..Place::default() };

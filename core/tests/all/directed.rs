@@ -1,4 +1,4 @@
-//! Directed drives, and what follows them: motions in their order, another command from where they end, the hand-off on arrival.
+//! Directed drives: motions in their order, another command from their end, the hand-off on arrival.
 
 use std::path::Path;
 
@@ -47,7 +47,7 @@ fn to_end(drive: &mut TargetedDrive, settings: &Settings) {
 }
 
 #[test]
-fn motions_are_driven_in_their_order_and_another_command_goes_on_from_there() {
+fn directed_motions_run_in_order_and_can_be_continued() {
     let folder = tempfile::tempdir().unwrap();
     let settings = Settings::default();
     let motions: Vec<Motion> =
@@ -60,7 +60,7 @@ fn motions_are_driven_in_their_order_and_another_command_goes_on_from_there() {
     assert_eq!((drive.why(), drive.steps.len()), (None, 5));
     let driven: Vec<Motion> = drive.cycles.iter().filter_map(|cycle| cycle.motion).collect();
     assert_eq!(driven, motions);
-    // The true rover went that way, on level ground and by wheels that slip little.
+    // The true rover followed the motions, on level ground with little slip.
     let (mut place, mut heading) = ([0.0f64; 2], 0.0f64);
     for motion in &motions {
         let ([ahead, right], turn) = motion.after(1.0);
@@ -81,14 +81,14 @@ fn motions_are_driven_in_their_order_and_another_command_goes_on_from_there() {
     println!("{summary:?}");
     assert!(summary.arrived && summary.flight_minutes > minutes && summary.target_error_m.unwrap() < 0.02);
     assert_eq!(drive.command.since, Some(4));
-    // A drive that concerns the rover itself does not go on.
+    // A command whose value is out of range is refused.
     let refused =
         drive.go_on(DriveCommand { standoff_m: 30.0, tilt_max_deg: 90.0, ..DriveCommand::default() });
     assert!(refused.unwrap_err().to_string().contains("tilt_max_deg"));
 }
 
 #[test]
-fn a_target_is_handed_over_to_the_hazcams_and_registered_to_the_first_view() {
+fn hand_off_registers_the_hazcams_to_the_first_view() {
     let folder = tempfile::tempdir().unwrap();
     let settings = preset("combined").unwrap().settings().unwrap();
     for (name, looks) in [("direct", 0), ("after-a-look", 1)] {
@@ -105,18 +105,18 @@ fn a_target_is_handed_over_to_the_hazcams_and_registered_to_the_first_view() {
         assert_eq!(summary.reason, Some(StopReason::Arrived));
         // Without a look the last surface is that of the designation.
         assert_eq!(found.to_step, if looks == 0 { 0 } else { mast.step });
-        // The surface of the designation, 5 m away, is the coarser one.
+        // The surface of the designation, from 5 m, is less accurate.
         assert!(found.failure.is_none() && summary.target_error_m.unwrap() < 0.02 / (1.0 + looks as f64));
         let placement = handed.shape().unwrap().placement.expect("the arm is told");
-        // The standoff of 2 m is beyond the arm.
+        // The standoff of 2 m exceeds the reach of the arm.
         assert!(!placement.is_reachable && placement.offset_m.is_some(), "{placement:?}");
-        // The rover stands still, and the pair is that of the body.
+        // The rover does not move, and the pair is that of the body.
         let state = drive.world.state();
         assert_eq!(state[count - 1].true_site_from_rover, state[count - 2].true_site_from_rover);
         assert_eq!(state[count - 1].mast_angles, state[count - 2].mast_angles);
         let index = drive.world.traverse().index();
         assert!(index.stops[count - 1].mast_angles.is_none() && index.stops[count - 2].mast_angles.is_some());
-        // Opened again, the drive has the same images and steps.
+        // A reopened drive has the same images and steps.
         let path = drive.world.traverse().folder().to_owned();
         let again = DrivenTraverse::resume(&path).unwrap();
         assert_eq!(again.state(), drive.world.state());
@@ -139,12 +139,12 @@ fn drive_target(world: &DrivenTraverse, scenario: &Scenario) -> Designation {
 }
 
 #[test]
-fn an_approach_after_arrival_brings_the_target_into_reach_of_the_arm() {
+fn the_final_approach_brings_the_target_within_reach() {
     let folder = tempfile::tempdir().unwrap();
     let settings = preset("combined").unwrap().settings().unwrap();
     let on_arrival = vec![ArrivalAction::Approach, ArrivalAction::Look, ArrivalAction::HandOff];
     let command = DriveCommand { on_arrival, ..DriveCommand::default() };
-    // The wheels' lines are free of rocks up to the end of the planned drive.
+    // The tracks of the wheels are free of rocks up to the end of the planned drive.
     let mut scenario = scenario();
     scenario.drive.end_distance_m = 1.8;
     let mut drive = begin_in(&scenario, &folder.path().join("clear"), command.clone(), &settings);
@@ -166,7 +166,7 @@ fn an_approach_after_arrival_brings_the_target_into_reach_of_the_arm() {
     let placement = handed.shape().unwrap().placement.expect("the arm is told");
     assert!(placement.is_reachable, "{placement:?}");
 
-    // Where rocks lie on the way, an approach without a map stalls at one; with a map it does not begin.
+    // Among rocks, an approach without a map stalls at one; with a map it does not start.
     let to_rocks = |name: &str, navigator: NavigatorKind| {
         let command = DriveCommand { standoff_m: 2.6, navigator, ..command.clone() };
         let settings = Settings::default();

@@ -63,16 +63,16 @@ fn a_drive_arrives_within_centimetres_of_the_true_target() {
     assert_eq!((summary.arrived, summary.reason), (true, Some(StopReason::Arrived)));
     assert_eq!((summary.tracked, summary.collisions), (Some(true), 0));
     assert!(summary.target_error_m.unwrap() < 0.02 && summary.goal_error_m.unwrap() < 0.05);
-    // The mast follows: the target appears near the image's centre at every stop.
+    // The mast follows the target: it appears near the image centre at every stop.
     for step in &drive.steps[1..] {
         let centre = step.point_mast.left.centre_pixel();
         let off_px = step.located().unwrap().left_pixel.unwrap().distance(centre);
         assert!(off_px < 60.0, "stop {}: {off_px} px", step.step);
         let metered_px = drive.world.state()[step.step].metered_px.unwrap();
-        // Around the prediction by wheels, which vision then corrects by a few pixels.
+        // The pointing is centred on the prediction by wheels, which vision then corrects by a few pixels.
         assert!(metered_px.distance(step.point_mast.predicted_left.unwrap()) < 8.0);
     }
-    // The estimate's covariance contains the known error of the mast.
+    // The covariance of the estimate includes the known error of the mast.
     for step in &drive.steps {
         let error = step.point_mast.error_covariance_in_rover.unwrap();
         let sigma_m = error.symmetric_eigenvalues().max().sqrt();
@@ -81,7 +81,7 @@ fn a_drive_arrives_within_centimetres_of_the_true_target() {
         let added = step.update.target.covariance_in_rover - located;
         assert!((added - error).norm() < 0.1 * error.norm(), "stop {}", step.step);
     }
-    // No step is longer than a tenth of the distance to the target, beside what makes good the slip of the step before.
+    // No step is longer than a tenth of the distance to the target, apart from the compensation of the previous step's slip.
     for (step, cycle) in drive.steps.iter().zip(&drive.cycles) {
         let distance_m = step.update.target.last_distance_m;
         assert!(cycle.report.is_none_or(|report| report.wheels_m < 0.115 * distance_m));
@@ -89,7 +89,7 @@ fn a_drive_arrives_within_centimetres_of_the_true_target() {
 }
 
 #[test]
-fn a_look_after_arrival_is_one_more_stop_with_the_target_at_the_centre() {
+fn a_look_after_arrival_centres_the_target_at_one_more_stop() {
     let folder = tempfile::tempdir().unwrap();
     let (world, designation) = world(&folder.path().join("drive"));
     let command =
@@ -106,7 +106,7 @@ fn a_look_after_arrival_is_one_more_stop_with_the_target_at_the_centre() {
         assert!(drive.cycles[k - 1].motion.is_none() && drive.cycles[k - 1].ending.is_none());
         assert_eq!(state[k].true_site_from_rover, arrived.true_site_from_rover);
         assert_eq!(state[k].site_from_rover, arrived.site_from_rover);
-        // The mast points at the target as it was located at the stop before.
+        // The mast points at the target as located at the previous stop.
         let step = &drive.steps[k];
         let predicted = step.point_mast.predicted_left.unwrap();
         assert!(predicted.distance(step.point_mast.left.centre_pixel()) < 1e-6, "{predicted:?}");
@@ -115,7 +115,7 @@ fn a_look_after_arrival_is_one_more_stop_with_the_target_at_the_centre() {
 }
 
 #[test]
-fn without_the_comparison_with_the_truth_and_on_one_thread_a_drive_has_the_same_bits() {
+fn threads_and_ground_truth_do_not_change_a_drive() {
     let folder = tempfile::tempdir().unwrap();
     let judged = drive(&folder.path().join("judged"));
     let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
@@ -124,7 +124,7 @@ fn without_the_comparison_with_the_truth_and_on_one_thread_a_drive_has_the_same_
     assert_eq!(cycles, judged.cycles);
     assert_eq!(world.state(), judged.world.state());
     assert_eq!(steps.len(), judged.steps.len());
-    // The designation alone may carry a warning that the truth adds.
+    // Only the designation may have a warning that needs the truth.
     for (blind, judged) in steps.iter().zip(&judged.steps).skip(1) {
         assert_eq!(*blind, judged.trace);
     }
@@ -158,7 +158,7 @@ fn drive_blind(folder: &Path) -> (DrivenTraverse, Vec<StepTrace>, Vec<Cycle>) {
 }
 
 #[test]
-fn a_recording_shows_how_far_the_commands_are_from_what_was_driven() {
+fn replay_compares_commands_with_the_recorded_motion() {
     let folder = tempfile::tempdir().unwrap();
     let planned = create_simulated(&scenario(), folder.path()).unwrap();
     let pixel = choose_targets(planned.world().unwrap(), &scenario(), planned.index())[0];
@@ -170,8 +170,8 @@ fn a_recording_shows_how_far_the_commands_are_from_what_was_driven() {
     let summary = drive.summary();
     println!("{summary:?}");
     assert_eq!((drive.steps.len(), drive.cycles.len()), (summary.stops, summary.stops));
-    // The approach was planned with steps of a tenth of the distance straight ahead, as the command has them; the target is
-    // beside its centre, so that the commanded path bends.
+    // The planned approach has steps of a tenth of the distance straight ahead, like the command; the target is beside its
+    // centre, so that the commanded path is curved.
     let [median_m, max_m] = summary.apart_m.unwrap();
     assert!(median_m < 0.05 && max_m < 0.3, "{summary:?}");
     assert!(summary.holds_target && summary.mast_apart_deg.unwrap() < 15.0, "{summary:?}");
@@ -200,7 +200,7 @@ fn a_drive_branched_at_a_stop_leaves_the_trunk_as_it_was() {
     assert!(branch.advance(&settings, Cancel::default()).unwrap());
     assert_ne!(branch.world.state()[3], trunk.world.state()[3]);
     assert_eq!((trunk.world.state().to_vec(), trunk.steps.clone(), trunk.cycles.clone()), kept);
-    // With the trunk's command the branch is the trunk.
+    // With the trunk's command the branch equals the trunk.
     branch.world.restore(trunk.world.state()[..3].to_vec()).unwrap();
     (branch.steps, branch.cycles) = (trunk.steps[..3].to_vec(), trunk.cycles[..2].to_vec());
     branch.command = command();
@@ -245,7 +245,7 @@ fn a_command_that_makes_no_sense_is_refused_in_one_sentence() {
     );
 }
 
-/// Ground on which little but the rover's own tracks can be told apart, and a rock ahead.
+/// Ground on which little but the rover's own tracks has texture, and a rock ahead.
 fn smooth_ground(texture: f64) -> Scenario {
     let mut scenario = scenario();
     (scenario.terrain.slope_deg, scenario.terrain.rms_at_1m_m) = (0.0, 0.005);
@@ -273,21 +273,21 @@ fn on_smooth_ground(texture: f64, odometry_pair: OdometryPair) -> Vec<DrivenStop
     let mut drive = TargetedDrive::begin(world, designation, command, &settings, Cancel::default()).unwrap();
     while drive.advance(&settings, Cancel::default()).unwrap() {}
     assert_eq!(drive.steps.len(), 5);
-    // The state has all of it: the drive continues from its folder.
+    // The state is complete: the drive continues from its folder.
     let resumed = DrivenTraverse::resume(&folder.path().join("drive")).unwrap();
     assert_eq!(resumed.state(), drive.world.state());
     drive.world.state().to_vec()
 }
 
-/// Distance of the estimated from the true place, m.
-fn off_m(stop: &DrivenStop) -> f64 {
+/// Distance of the estimated from the true position, m.
+fn position_error_m(stop: &DrivenStop) -> f64 {
     let [estimated, truth] =
         [stop.site_from_rover, stop.true_site_from_rover].map(|pose| pose.to_pose().translation.vector);
     (estimated - truth).norm()
 }
 
 #[test]
-fn where_the_ground_ahead_tells_nothing_the_rover_looks_back_at_its_tracks() {
+fn the_rover_looks_back_where_the_ground_ahead_is_blank() {
     let stops = on_smooth_ground(0.4, OdometryPair::Shared);
     assert!(stops[0].odometry_look.is_none(), "the first motion is measured in the tracker's pairs");
     let first = stops[1].odometry.as_ref().unwrap();
@@ -298,7 +298,7 @@ fn where_the_ground_ahead_tells_nothing_the_rover_looks_back_at_its_tracks() {
         assert_eq!(camera, (Some(CameraName::ODOMETRY), true, true), "{number}: {measured:?}");
         let ahead = measured.refused_too.as_ref().unwrap();
         assert!(ahead.contains("odometry_inliers"), "{number}: {ahead}");
-        assert!(off_m(stop) - off_m(&stops[number - 1]) < 0.005, "{number}");
+        assert!(position_error_m(stop) - position_error_m(&stops[number - 1]) < 0.005, "{number}");
     }
     for stop in &stops[1..] {
         assert!(stop.odometry_look.unwrap().azimuth_rad.cos() < -0.9, "{:?}", stop.odometry_look);
@@ -306,14 +306,14 @@ fn where_the_ground_ahead_tells_nothing_the_rover_looks_back_at_its_tracks() {
 }
 
 #[test]
-fn pairs_of_its_own_measure_the_motion_before_the_mast_points_at_the_target() {
+fn own_pairs_measure_the_motion_before_mast_pointing() {
     let stops = on_smooth_ground(0.5, OdometryPair::Own);
     for (number, stop) in stops.iter().enumerate() {
         let look = stop.odometry_look.unwrap();
         assert!(look.azimuth_rad.cos() > 0.9 && look.elevation_rad < -0.3, "{number}: {look:?}");
         if let Some(measured) = &stop.odometry {
             assert_eq!((measured.camera, measured.corrects), (Some(CameraName::ODOMETRY), true), "{number}");
-            assert!(off_m(stop) < 0.005, "{number}: {} m", off_m(stop));
+            assert!(position_error_m(stop) < 0.005, "{number}: {} m", position_error_m(stop));
         } else {
             assert_eq!(number, 0);
         }

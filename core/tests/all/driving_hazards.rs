@@ -1,4 +1,4 @@
-//! Closed-loop drives on the hazard map: rocks on the way, missing range data, no safe path.
+//! Closed-loop drives on the hazard map: rocks on the path, missing range data, no safe path.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -22,14 +22,14 @@ fn scenario() -> Scenario {
     (scenario.camera.image_size, scenario.camera.samples_per_axis) = (256, 2);
     scenario.targets.window_px = 9;
     (scenario.drive.start_distance_m, scenario.drive.end_distance_m) = (8.0, 2.0);
-    // One rock on level ground; no other is in the way.
+    // One rock on level ground blocks the path; no other does.
     (scenario.rocks.area_fraction, scenario.rocks.smallest_m) = (0.01, 0.1);
     scenario.terrain.slope_deg = 0.0;
     scenario
 }
 
 fn command(navigator: NavigatorKind) -> DriveCommand {
-    // The small images are for the hazard map: tracking has no influence.
+    // The small images are for the hazard map; tracking has no influence on the path.
     DriveCommand { navigator, goal: GoalRule::Fixed, stops_max: 60, ..DriveCommand::default() }
 }
 
@@ -47,7 +47,7 @@ fn to_end(drive: &mut TargetedDrive) {
 }
 
 #[test]
-fn the_map_leads_round_a_rock_that_stalls_an_arc_and_a_resumed_drive_too() {
+fn the_hazard_map_leads_round_a_rock_also_after_resuming() {
     let folder = tempfile::tempdir().unwrap();
     let in_folder =
         |name: &str, navigator| begin(&scenario(), command(navigator), &folder.path().join(name)).unwrap();
@@ -66,7 +66,7 @@ fn the_map_leads_round_a_rock_that_stalls_an_arc_and_a_resumed_drive_too() {
     let vetoed = |cycle: &Cycle| cycle.choice.as_ref().map_or(0, PathChoice::vetoed_count);
     assert!(gestalt.cycles.iter().any(|cycle| vetoed(cycle) > 0));
 
-    // Once more up to the middle, then from the folder.
+    // The same up to the middle, then continued from the folder.
     let mut half = in_folder("half", NavigatorKind::Gestalt);
     let middle = gestalt.steps.len() / 2;
     for _ in 0..middle {
@@ -84,7 +84,7 @@ fn the_map_leads_round_a_rock_that_stalls_an_arc_and_a_resumed_drive_too() {
 }
 
 #[test]
-fn a_drive_without_the_pair_of_the_map_is_refused_in_one_sentence() {
+fn a_drive_without_the_hazard_map_pair_is_rejected() {
     let folder = tempfile::tempdir().unwrap();
     let refused = |name: &str, scenario: &Scenario, hazard_camera: Option<&str>| {
         let hazard_cameras = hazard_camera.map(|name| name.parse::<CameraName>().unwrap());
@@ -103,7 +103,7 @@ fn a_drive_without_the_pair_of_the_map_is_refused_in_one_sentence() {
 }
 
 #[test]
-fn without_range_data_or_a_safe_path_the_rover_stays_and_says_why() {
+fn the_rover_stays_without_range_data_or_a_safe_path() {
     let folder = tempfile::tempdir().unwrap();
     let mut drive =
         begin(&scenario(), command(NavigatorKind::Gestalt), &folder.path().join("drive")).unwrap();
@@ -136,7 +136,7 @@ fn without_range_data_or_a_safe_path_the_rover_stays_and_says_why() {
     let blocked = ending(&|hazards| {
         let grid = hazards.map.grid;
         for (index, cell) in hazards.map.cells.iter_mut().enumerate() {
-            // The rover is in the middle of the window, on the only good ground.
+            // The rover is at the centre of the window, on the only good ground.
             let [row, column] =
                 [index / grid.side, index % grid.side].map(|n| n as f64 - 0.5 * grid.side as f64);
             let is_near = grid.cell_m * row.hypot(column) < 0.45;
@@ -151,7 +151,7 @@ fn without_range_data_or_a_safe_path_the_rover_stays_and_says_why() {
 }
 
 #[test]
-fn time_that_the_map_uses_up_ends_the_drive_before_the_rover_moves() {
+fn mapping_beyond_the_time_budget_ends_the_drive() {
     let folder = tempfile::tempdir().unwrap();
     // The map of the first stop takes 5 minutes.
     let command = DriveCommand { flight_minutes_max: 2.0, ..command(NavigatorKind::Gestalt) };
@@ -164,7 +164,7 @@ fn time_that_the_map_uses_up_ends_the_drive_before_the_rover_moves() {
 }
 
 #[test]
-fn a_drive_whose_goal_is_a_rock_ends_beside_it_and_says_so() {
+fn a_drive_to_a_rock_ends_beside_it_with_a_reason() {
     let folder = tempfile::tempdir().unwrap();
     let mut drive =
         begin(&scenario(), command(NavigatorKind::Gestalt), &folder.path().join("drive")).unwrap();

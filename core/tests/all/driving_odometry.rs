@@ -1,4 +1,4 @@
-//! Drives whose poses vision corrects: on a slope where the wheels slip, and with wheels that turn on the spot.
+//! Drives whose poses are corrected by visual odometry: on a slope with wheel slip, and with wheels that spin in place.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ use sightline_world::scenario::{ClearPath, ForcedSlip, OdometryModel};
 use sightline_world::target_truth::TruthSource;
 use sightline_world::{Scenario, choose_targets, library};
 
-/// A slope on which the wheels lose a third of their way and slide aside.
+/// A slope on which the wheels lose a third of the distance and the rover slides sideways.
 fn slope() -> Scenario {
     let mut scenario = Scenario { seed: 5301, ..library::scenario("approach-10").unwrap() };
     (scenario.camera.image_size, scenario.camera.samples_per_axis) = (512, 2);
@@ -44,7 +44,7 @@ fn with(odometry: OdometryMode) -> DriveCommand {
 }
 
 /// Distance of the estimated pose from the true one at the last stop, m, and the angle between them, deg.
-fn off(traverse: &Traverse) -> (f64, f64) {
+fn pose_error(traverse: &Traverse) -> (f64, f64) {
     let last = traverse.stop_count() - 1;
     let truth = TruthSource::true_site_from_rover(traverse, last).unwrap();
     let apart: Pose = truth.inverse() * traverse.site_from_rover(last);
@@ -52,18 +52,18 @@ fn off(traverse: &Traverse) -> (f64, f64) {
 }
 
 #[test]
-fn on_a_slope_vision_keeps_the_pose_that_wheels_lose() {
+fn visual_odometry_keeps_the_pose_on_a_slope() {
     let folder = tempfile::tempdir().unwrap();
     let [full, check, none] = [OdometryMode::Full, OdometryMode::SlipCheck, OdometryMode::Off]
         .map(|mode| drive(&slope(), with(mode), 6, &folder.path().join(format!("{mode:?}"))));
-    let [seen, checked, blind] = [&full, &check, &none].map(|drive| off(drive.world.traverse()));
+    let [seen, checked, blind] = [&full, &check, &none].map(|drive| pose_error(drive.world.traverse()));
     println!("{seen:?} {checked:?} {blind:?}");
     assert!(seen.0 < 0.02 && seen.1 < 0.2, "{seen:?}");
     assert!(blind.0 > 0.2 && checked.0 > 0.2, "{blind:?} {checked:?}");
     for step in &full.steps[1..] {
         let measured = step.odometry.as_ref().unwrap();
         assert!(measured.corrects && measured.update.accepted, "{:?}", measured.update.refusal());
-        // The covariance of the prediction is that of vision, an order below that of wheels.
+        // The covariance of the prediction is that of vision, an order of magnitude below that of the wheels.
         let sigma_m = step.prediction().unwrap().covariance_in_rover.symmetric_eigenvalues().max().sqrt();
         assert!(sigma_m < 0.1, "{sigma_m}");
     }
@@ -73,13 +73,13 @@ fn on_a_slope_vision_keeps_the_pose_that_wheels_lose() {
         assert!(!measured.corrects && slip.along.hypot(slip.aside) > 0.05, "{slip:?}");
         assert!(blind.odometry.is_none());
     }
-    // No step is longer than odometry follows, and the next step makes its slip good.
+    // No step is longer than visual odometry can follow, and the next step compensates its slip.
     let reports = full.cycles.iter().filter_map(|cycle| cycle.report);
     assert!(reports.clone().all(|report| report.wheels_m < 1.51));
 }
 
 #[test]
-fn a_drive_with_odometry_is_resumed_with_the_same_bits_and_replayed_with_the_same_poses() {
+fn odometry_drives_resume_and_replay_bit_for_bit() {
     let folder = tempfile::tempdir().unwrap();
     let whole = drive(&slope(), with(OdometryMode::Full), 4, &folder.path().join("whole"));
     let opened = Traverse::open(&folder.path().join("whole")).unwrap();
@@ -91,7 +91,7 @@ fn a_drive_with_odometry_is_resumed_with_the_same_bits_and_replayed_with_the_sam
     assert_eq!(resumed.state(), whole.world.state());
     let again = drive(&slope(), with(OdometryMode::Full), 4, &folder.path().join("again"));
     assert_eq!(again.world.state(), whole.world.state());
-    // The corners, which are not kept, come with the same update when it is computed again.
+    // The corners are not stored; they are returned with the same update when it is computed again.
     let kept = opened.index().stops[2].odometry.as_ref().unwrap();
     let mut computed = kept.again(&opened, 2, Cancel::default()).unwrap();
     assert!(computed.table.len() > 50);
@@ -100,7 +100,7 @@ fn a_drive_with_odometry_is_resumed_with_the_same_bits_and_replayed_with_the_sam
 }
 
 #[test]
-fn wheels_that_turn_on_the_spot_end_the_drive_with_its_reason() {
+fn spinning_wheels_end_the_drive_with_a_reason() {
     let mut scenario = slope();
     (scenario.terrain.slope_deg, scenario.rover.slip_scale) = (2.0, 0.0);
     scenario.rover.forced_slip = vec![ForcedSlip { stop: 2, slip: 1.0 }, ForcedSlip { stop: 3, slip: 1.0 }];
@@ -134,7 +134,7 @@ fn odometry_runs_alone_at_the_stops_between_two_steps() {
             assert_eq!(step.is_odometry_alone(), stops[step.step].odometry_alone, "{place}");
             assert!(step.odometry.as_ref().unwrap().update.accepted, "{place}");
             let Some(Motion::Arc { length_m, .. }) = cycle.motion else { panic!("{place} follows no arc") };
-            // Two parts of one step have the same length up to what the slip left.
+            // The two parts of a step have the same length, apart from the effect of slip.
             if step.is_odometry_alone() {
                 left_m = length_m;
                 assert!(length_m < 0.75 / 0.9 && step.verdict().is_none() && step.capture().is_none());
@@ -143,7 +143,7 @@ fn odometry_runs_alone_at_the_stops_between_two_steps() {
                 assert!((length_m / left_m - 1.0).abs() < 0.2, "{place}: {length_m} m after {left_m} m");
                 left_m = 0.0;
             }
-            // The range alone is known to 5 cm at 8 m.
+            // The range alone has a 1σ of 5 cm at 8 m.
             assert!(step.truth.as_ref().unwrap().err_m < 0.1, "{place}");
         }
         let alone: Vec<usize> =
@@ -157,13 +157,13 @@ fn odometry_runs_alone_at_the_stops_between_two_steps() {
             metrics(&drive.steps).excluded.iter().find(|one| one.why.contains("alone")).unwrap().steps,
             alone
         );
-        // The kind of the step survives serialisation.
+        // Serialisation preserves the kind of the step.
         let text = serde_json::to_string(drive.steps[1].as_ref()).unwrap();
         assert!(serde_json::from_str::<RunStep>(&text).unwrap().is_odometry_alone());
     }
     let sum = |drive: &TargetedDrive| drive.cycles.iter().map(|cycle| cycle.flight.locate_s).sum::<f64>();
     assert!(sum(&shared) < sum(&every));
-    // The tracker's pair was never taken where vision has one of its own.
+    // The tracker's pair is not taken at stops at which odometry uses a pair of its own.
     let taken = |drive: &TargetedDrive, step: usize| {
         let traverse = drive.world.traverse();
         traverse.folder().join(&traverse.index().stops[step].left.image).exists()

@@ -1,4 +1,4 @@
-//! A drive on a hazard map of the mast's navcams: two wedges show the way round a rock (R101, R102).
+//! A drive on a hazard map from the mast's navcams: two wedges show the way around a rock (R101, R102).
 
 use std::path::Path;
 
@@ -18,9 +18,9 @@ fn scenario() -> Scenario {
     (scenario.camera.image_size, scenario.camera.samples_per_axis) = (256, 2);
     scenario.targets.window_px = 9;
     (scenario.drive.start_distance_m, scenario.drive.end_distance_m) = (8.0, 2.0);
-    // The mast is turned a little elsewhere than it is told.
+    // The mast has a pointing error.
     scenario.drive.pointing_error_deg = 0.05;
-    // One rock on level ground; no other is in the way.
+    // One rock on level ground blocks the path; no other does.
     (scenario.rocks.area_fraction, scenario.rocks.smallest_m) = (0.01, 0.1);
     scenario.terrain.slope_deg = 0.0;
     scenario
@@ -35,7 +35,7 @@ fn begin(scenario: &Scenario, hazard_cameras: Vec<CameraName>, folder: &Path) ->
     let world = DrivenTraverse::begin(scenario, folder, Cancel::default()).unwrap();
     let traverse = world.traverse();
     let pixel = choose_targets(traverse.world().unwrap(), scenario, traverse.index())[0];
-    // The small images are for the hazard map: tracking has no influence.
+    // The small images are for the hazard map; tracking has no influence on the path.
     let command = DriveCommand {
         navigator: NavigatorKind::Gestalt,
         goal: GoalRule::Fixed,
@@ -57,7 +57,7 @@ fn two_wedges_of_the_navcams_lead_round_a_rock() {
     assert_eq!((summary.reason, summary.collisions), (Some(StopReason::Arrived), 0));
     assert!(drive.cycles.iter().any(|cycle| cycle.choice.as_ref().is_some_and(|c| c.vetoed_count() > 0)));
 
-    // Both pairs look where the scenario tells, also where the mast is turned elsewhere.
+    // Both pairs look in the direction of the scenario, also with the pointing error.
     let traverse = drive.world.traverse();
     let stop = &traverse.index().stops[3];
     for (camera, azimuth_deg) in stop.cameras.iter().zip([-20.0, 20.0_f64]) {
@@ -73,7 +73,7 @@ fn two_wedges_of_the_navcams_lead_round_a_rock() {
 }
 
 #[test]
-fn two_wedges_show_the_ground_on_either_side_and_none_below_the_rover() {
+fn two_wedges_cover_both_sides_but_not_below_the_rover() {
     let folder = tempfile::tempdir().unwrap();
     let sides = |word: &str, hazard_cameras: Vec<CameraName>| {
         let mut drive = begin(&scenario(), hazard_cameras, &folder.path().join(word));

@@ -1,4 +1,4 @@
-//! Faults injected into a drive: each does what it says at its stops alone, and the drive copes with it or says why not.
+//! Faults injected into a drive: each affects only its own stops, and the drive continues or stops with a reason.
 
 use std::path::Path;
 
@@ -52,7 +52,7 @@ fn states(drive: &TargetedDrive) -> Vec<TrackingState> {
 }
 
 #[test]
-fn each_fault_does_what_it_says_at_its_stops_alone() {
+fn each_fault_affects_only_its_stops() {
     let folder = tempfile::tempdir().unwrap();
     let plain = DrivenTraverse::begin(&scenario(), &folder.path().join("plain"), Cancel::default()).unwrap();
     let with = |kind: FaultKind| drive(&plain, kind, &folder.path().join(kind.name()));
@@ -101,7 +101,7 @@ fn each_fault_does_what_it_says_at_its_stops_alone() {
     }
     assert!(blind.steps[TO + 1].verdict().unwrap().accepted);
 
-    // A stop that the rover has left cannot be changed any more.
+    // A stop that the rover has left cannot be changed.
     let late = [sightline_world::scenario::Fault {
         kind: FaultKind::Shadow,
         from_stop: 2,

@@ -1,4 +1,4 @@
-//! The feature locator over a world whose truth is a formula.
+//! The feature locator in a world with an analytic ground truth.
 
 use nalgebra::UnitQuaternion;
 use serde_json::{Value, json};
@@ -21,7 +21,7 @@ fn settings(changes: &[(&str, Value)]) -> Settings {
     preset("features").unwrap().settings().unwrap().with(&changes).unwrap()
 }
 
-/// A drive of six stops towards the plane, a fifteenth nearer each time, with a little turn.
+/// A drive of six stops towards the plane, each a fifteenth closer, with a small turn.
 fn drive() -> PlaneWorld {
     let stop = |i: i32| {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.01 * f64::from(i));
@@ -38,8 +38,8 @@ fn run(world: &PlaneWorld, settings: &Settings) -> Vec<RunStep> {
     track::run(world, designation, settings).unwrap()
 }
 
-/// What tracking added to the error of the designation, m.
-fn drift_m(world: &PlaneWorld, steps: &[RunStep]) -> f64 {
+/// The error that tracking adds to that of the designation, m.
+fn position_error_m(world: &PlaneWorld, steps: &[RunStep]) -> f64 {
     let last = steps.last().unwrap();
     let now_from_first = world.true_poses[last.step].inverse() * world.true_poses[0];
     (last.update.target.position_in_rover - now_from_first * steps[0].update.target.position_in_rover).norm()
@@ -50,11 +50,11 @@ fn states(steps: &[RunStep]) -> Vec<&'static str> {
 }
 
 #[test]
-fn the_target_follows_the_motion_of_the_scene_within_millimetres() {
+fn the_target_follows_the_scene_within_millimetres() {
     let world = drive();
     for (name, most_m) in [("features", 0.002), ("features-paper", 0.03)] {
         let steps = run(&world, &preset(name).unwrap().settings().unwrap());
-        assert!(drift_m(&world, &steps) < most_m, "{name}: {} m", drift_m(&world, &steps));
+        assert!(position_error_m(&world, &steps) < most_m, "{name}: {} m", position_error_m(&world, &steps));
         for step in &steps[1..] {
             let located = step.located().unwrap();
             assert_eq!(step.update.state, TrackingState::Tracking);
@@ -64,7 +64,7 @@ fn the_target_follows_the_motion_of_the_scene_within_millimetres() {
 }
 
 #[test]
-fn the_covariance_never_shrinks_and_holds_the_drift() {
+fn the_covariance_never_shrinks_and_covers_the_drift() {
     let world = drive();
     let steps = run(&world, &settings(&[("feature_memory", json!(1))]));
     let sizes: Vec<Vector3> = steps
@@ -81,11 +81,15 @@ fn the_covariance_never_shrinks_and_holds_the_drift() {
         }
     }
     let grown = (sizes[5] - sizes[0]).map(|v| v.max(0.0)).sum().sqrt();
-    assert!(drift_m(&world, &steps) < 4.0 * grown + 1e-4, "{} m, {grown} m", drift_m(&world, &steps));
+    assert!(
+        position_error_m(&world, &steps) < 4.0 * grown + 1e-4,
+        "{} m, {grown} m",
+        position_error_m(&world, &steps)
+    );
 }
 
 #[test]
-fn a_covered_stop_is_dead_reckoned_and_the_target_found_again_after_it() {
+fn a_covered_stop_is_dead_reckoned_and_the_target_reacquired() {
     let mut world = drive();
     world.troubles[2] = Trouble::Covered;
     world.troubles[3] = Trouble::Covered;
@@ -95,17 +99,17 @@ fn a_covered_stop_is_dead_reckoned_and_the_target_found_again_after_it() {
     assert!(located.missing.as_ref().unwrap().contains("since step 1"), "{:?}", located.missing);
     let sigma = |step: &RunStep| step.row().sigma_m.unwrap();
     assert!(sigma(&steps[3]) > sigma(&steps[2]) && sigma(&steps[2]) > sigma(&steps[1]));
-    // What dead reckoning added while the stops were covered is gone again.
-    assert!(sigma(&steps[4]) < sigma(&steps[2]) && drift_m(&world, &steps) < 0.002);
+    // The uncertainty that dead reckoning added while the stops were covered is removed again.
+    assert!(sigma(&steps[4]) < sigma(&steps[2]) && position_error_m(&world, &steps) < 0.002);
     let evidence = steps[4].features().unwrap();
     assert!(evidence.match_features.unwrap().from_step <= 1);
 }
 
 #[test]
-fn once_lost_it_must_be_surer_to_return() {
+fn reacquisition_requires_a_higher_confidence() {
     let world = drive();
     let count = run(&world, &settings(&[]))[1].row().inliers.unwrap();
-    // A confidence of 0.6 at every step: enough to stay, too little to return.
+    // A confidence of 0.6 at every step: enough to remain tracked, too little to be found again.
     let middle = count as f64 - (0.6_f64 / 0.4).ln() / 0.1;
     let at = |middle: f64| settings(&[("confidence_matches", json!(middle)), ("feature_memory", json!(1))]);
     let gate = |steps: &[RunStep], step: usize| steps[step].verdict().unwrap().gates[0].limit;
@@ -117,22 +121,22 @@ fn once_lost_it_must_be_surer_to_return() {
 }
 
 #[test]
-fn a_wrong_pose_estimate_changes_nothing_and_is_given_up_as_a_prior() {
+fn a_wrong_pose_estimate_is_discarded_as_a_prior() {
     let mut world = drive();
     for pose in &mut world.estimates[2..] {
         *pose *= UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.2);
     }
     let free = run(&world, &settings(&[]));
-    assert!(drift_m(&world, &free) < 0.002, "{} m", drift_m(&world, &free));
+    assert!(position_error_m(&world, &free) < 0.002, "{} m", position_error_m(&world, &free));
     let given_up = |steps: &[RunStep], step: usize| {
         steps[step].features().unwrap().match_features.unwrap().prior_given_up
     };
     let bound = run(&world, &settings(&[("prior_radius_px", json!(20.0)), ("feature_memory", json!(1))]));
     assert!(states(&bound).iter().all(|state| *state == "tracking"), "{:?}", states(&bound));
-    assert!(drift_m(&world, &bound) < 0.002, "{} m", drift_m(&world, &bound));
+    assert!(position_error_m(&world, &bound) < 0.002, "{} m", position_error_m(&world, &bound));
     assert!(!given_up(&bound, 1) && given_up(&bound, 2));
     let right = run(&drive(), &settings(&[("prior_radius_px", json!(20.0))]));
-    assert!(drift_m(&drive(), &right) < 0.002 && !given_up(&right, 2));
+    assert!(position_error_m(&drive(), &right) < 0.002 && !given_up(&right, 2));
 }
 
 #[test]
@@ -144,7 +148,7 @@ fn two_identical_pairs_are_no_motion() {
     assert!(motion.roll_pitch_yaw_deg.iter().all(|degrees| degrees.abs() < 1e-9));
 }
 
-/// The drive with one eye covered from the second stop on.
+/// The drive with one camera covered from the second stop on.
 struct OneEyed(PlaneWorld);
 
 impl OneEyed {
@@ -176,7 +180,7 @@ impl OneEyed {
 }
 
 #[test]
-fn a_covered_eye_leaves_too_few_matches_and_says_so() {
+fn a_covered_eye_leaves_too_few_matches() {
     let why = OneEyed(drive()).located();
     assert!(why.contains("three") || why.contains("few"), "{why}");
 }
@@ -190,7 +194,7 @@ fn ranges_that_exclude_each_other_are_refused_with_their_names() {
 }
 
 #[test]
-fn the_tables_hold_every_feature_and_tell_those_that_agree() {
+fn the_tables_list_every_feature_and_mark_the_inliers() {
     let steps = run(&drive(), &settings(&[]));
     let evidence = steps[1].features().unwrap();
     let columns = sightline_track::locate::features::evidence::FeatureColumn::COUNT;
@@ -204,7 +208,7 @@ fn the_tables_hold_every_feature_and_tell_those_that_agree() {
 }
 
 #[test]
-fn what_was_found_for_one_target_serves_the_next() {
+fn features_of_one_target_are_reused_for_the_next() {
     let store = SharedStore::default();
     let settings = settings(&[]).features;
     let empty = sightline_track::locate::features::detect::StopFeatures::default;

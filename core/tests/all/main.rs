@@ -1,4 +1,4 @@
-//! Tests of the trackers over complete drives: they need the loop, the simulator and the recordings together.
+//! Tests of the trackers on complete drives, which need the loop, the simulator and the recordings together.
 
 #![allow(clippy::unwrap_used)]
 
@@ -25,7 +25,7 @@ mod faults;
 mod registration;
 mod stereo_rendered;
 mod stereo_recorded;
-mod hand_over;
+mod hand_off;
 mod cameras;
 mod odometry_scenarios;
 mod visual_odometry;

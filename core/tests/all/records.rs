@@ -1,4 +1,4 @@
-//! The declared records against the serialised steps of every tracker.
+//! The declared records, compared with the serialised steps of every tracker.
 
 use std::collections::BTreeSet;
 
@@ -64,7 +64,7 @@ fn declared_fields_are_fields_of_the_evidence() {
         }
     }
     let missing: Vec<&String> = declared.difference(&found).collect();
-    // Only a CAHVORE camera has an entrance pupil, and heights are weighed where a setting asks for it.
+    // Only a CAHVORE camera has an entrance pupil, and relief is recorded only if a setting enables it.
     assert!(missing.iter().all(|name| name.ends_with(".E") || name.starts_with("relief.")), "{missing:?}");
 }
 

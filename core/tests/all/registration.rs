@@ -1,4 +1,4 @@
-//! Registrations of made surfaces: right ones, and those that must be refused by their names.
+//! Registrations of synthetic surfaces: correct ones, and those that must be refused with their reasons.
 
 use nalgebra::Matrix3;
 use rand::SeedableRng;
@@ -29,13 +29,13 @@ fn exact() -> Stereo {
     Stereo { sigma_px: 0.0, wrong: 0.0, ..Stereo::default() }
 }
 
-/// Where a ray meets level ground.
+/// Intersection of a ray with level ground.
 fn ground(ray: &Ray) -> Option<(Point3, Vector3, f64)> {
     let distance_m = (GROUND_Z_M - ray.origin.z) / ray.direction.z;
     (distance_m > 0.0).then(|| (ray.at(distance_m), -Vector3::z(), distance_m))
 }
 
-/// Where a ray meets a ball.
+/// Intersection of a ray with a sphere.
 fn ball(ray: &Ray, centre: &Point3, radius_m: f64) -> Option<(Point3, Vector3, f64)> {
     let from = ray.origin - centre;
     let along = from.dot(&ray.direction);
@@ -57,7 +57,7 @@ fn rock(seed: u64, shape: RockShape) -> Rock {
     Rock::grow(&from, GROUND_Z_M, &-Vector3::z())
 }
 
-/// The rock seen twice; the target is where the line of sight of the first view meets it.
+/// The rock seen twice; the target is the intersection of the first view's line of sight with the rock.
 fn rock_case(rock: &Rock, stereo: &Stereo, seed: u64) -> Case {
     let cast = |ray: &Ray| {
         let on_rock = rock.interval(ray).filter(|interval| interval.enter_m > 0.0);
@@ -83,7 +83,7 @@ fn a_known_motion_is_found_from_exact_points() {
         let found = registered(&case, &start, &with(method));
         let row = case.row(&found, 0.6, method);
         assert_eq!(found.failure, None, "{method:?}");
-        // The start is 15 cm and 30 mrad off; facets of 1 cm cut the rock's edges.
+        // The start error is 15 cm and 30 mrad; facets of 1 cm cut off the rock's edges.
         assert!(row.error_m < 1.5e-3 && row.error_rad < 5e-3, "{method:?} {row:?}");
     }
 }
@@ -101,7 +101,7 @@ fn a_known_motion_is_found_as_well_as_the_noise_allows() {
 }
 
 #[test]
-fn the_objective_falls_from_start_to_coarse_to_fine_and_so_do_the_depth_errors() {
+fn objective_and_depth_errors_fall_from_coarse_to_fine() {
     let case = rock_case(&rock(4, RockShape::Block), &Stereo::default(), 3);
     let start = case.start(0.5, &Staging::default(), 7);
     for method in BOTH {
@@ -124,7 +124,7 @@ fn the_objective_falls_from_start_to_coarse_to_fine_and_so_do_the_depth_errors()
 }
 
 #[test]
-fn the_coarse_search_finds_the_shift_and_knows_its_surface() {
+fn the_coarse_search_finds_a_unique_shift() {
     let case = rock_case(&rock(3, RockShape::Angular), &exact(), 1);
     let staging = Staging { start_turn_rad: 0.0, ..Staging::default() };
     let start = case.start(0.7, &staging, 9);
@@ -239,7 +239,7 @@ fn another_rock_does_not_fit() {
 }
 
 #[test]
-fn surfaces_that_are_missing_or_apart_are_told_by_name() {
+fn missing_or_disjoint_surfaces_are_reported_by_name() {
     let case = rock_case(&rock(3, RockShape::Angular), &Stereo::default(), 1);
     let settings = with(Method::PointToPlane);
     let start = case.start(0.0, &Staging::default(), 3);
@@ -308,9 +308,9 @@ fn the_bits_do_not_depend_on_the_number_of_threads() {
     assert_eq!((one.coarse, one.path), (three.coarse, three.path));
 }
 
-/// Half a metre of noise-free registration would hide a wrong frame: the covariance turns with the frames.
+/// With noise, because a registration without noise cannot reveal a covariance in a wrong frame.
 #[test]
-fn the_covariance_is_that_of_the_scatter_over_draws_of_the_noise() {
+fn the_covariance_matches_the_scatter_under_noise() {
     let rock = rock(3, RockShape::Angular);
     let settings = with(Method::PointToPlane);
     let mut random = Pcg64::seed_from_u64(1);
@@ -320,7 +320,7 @@ fn the_covariance_is_that_of_the_scatter_over_draws_of_the_noise() {
     let errors: Vec<Vector3> = (0..draws)
         .map(|_| {
             let seed = rand::RngExt::random_range(&mut random, 0..1_000_000);
-            // The geometry is the same for every seed but for the tilt of the rover, which is switched off.
+            // The geometry is the same for every seed except for the tilt of the rover, which is set to zero.
             let staging = Staging { tilt_rad: 0.0, ..Staging::default() };
             let cast = |ray: &Ray| {
                 let on_rock = rock.interval(ray).filter(|interval| interval.enter_m > 0.0);

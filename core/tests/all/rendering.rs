@@ -1,6 +1,6 @@
-//! Rendered radiance against kept arrays: a faster renderer must compute the same light.
+//! Rendered radiance, compared with stored arrays: a faster renderer must compute the same light.
 //!
-//! Each scene is a strip of twelve squares of 16 × 16 px, spread over one image from the horizon to the wheels. The kept
+//! Each scene is a strip of twelve squares of 16 × 16 px, spread over one image from the horizon to the wheels. The stored
 //! strips are `core/tests/radiance/*.npy` (height 16, width 192, radiance). `SIGHTLINE_GOLDEN=update` writes them again
 //! after a deliberate change of the world: `SIGHTLINE_GOLDEN=update cargo test -p sightline-core --test all rendering`.
 
@@ -34,7 +34,7 @@ const CORNERS: [[f64; 2]; 12] = [
     [0.02, 0.95],
 ];
 
-/// A scenario, and the stop and eye of the image; stops count from the end where negative.
+/// A scenario, and the stop and camera of the image; negative stops count from the end.
 struct Scene {
     name: &'static str,
     scenario: Scenario,
@@ -100,7 +100,7 @@ fn file(name: &str) -> PathBuf {
 }
 
 #[test]
-fn rendered_radiance_is_that_of_the_kept_arrays() {
+fn rendered_radiance_equals_the_stored_arrays() {
     let is_update = std::env::var("SIGHTLINE_GOLDEN").is_ok_and(|word| word == "update");
     let mut wrong = Vec::new();
     for scene in scenes() {
@@ -119,7 +119,7 @@ fn rendered_radiance_is_that_of_the_kept_arrays() {
         if differing > 0 {
             wrong.push(format!("{}: {differing} pixels differ, by {largest:.2e} at most", scene.name));
         }
-        // A strip without contrast would show nothing.
+        // A strip without contrast would prove nothing.
         let mean = kept.as_raw().iter().sum::<f32>() / kept.as_raw().len() as f32;
         assert!(kept.as_raw().iter().any(|v| (v - mean).abs() > 0.1 * mean), "{}", scene.name);
     }

@@ -1,4 +1,4 @@
-//! The shape tracker and the combined one over a K9 drive of few stops and small pictures, and over a bare wall.
+//! The shape tracker and the combined one on a K9 drive of few stops and small images, and on a bare wall.
 
 use std::sync::LazyLock;
 
@@ -17,7 +17,7 @@ use sightline_track::settings::{Settings, TrackerKind};
 use sightline_track::target::{Designation, TrackingState};
 use sightline_world::{choose_targets, library};
 
-/// A drive from 5 m in three steps, its last stop taken again by the hazcams, and the pixel of its rock.
+/// A drive from 5 m in three steps, whose last stop is taken by the hazcams as well, and the pixel of its rock.
 struct Scene {
     _folder: tempfile::TempDir,
     traverse: Traverse,
@@ -53,7 +53,7 @@ fn registration(trace: &RunStep) -> &Registered {
 }
 
 #[test]
-fn features_are_followed_on_the_way_and_the_shape_is_asked_at_the_end_and_hands_over() {
+fn features_track_the_approach_and_shape_hands_off() {
     let steps = run(&combined());
     let [.., mast, hazcam] = steps.as_slice() else { panic!("too few stops") };
     for way in &steps[1..steps.len() - 2] {
@@ -70,7 +70,7 @@ fn features_are_followed_on_the_way_and_the_shape_is_asked_at_the_end_and_hands_
     assert_eq!((handed.to_step, handed.is_hand_off), (mast.step, true));
     assert_eq!((&handed.reason, &handed.draped_missing), (&None, &None));
     assert!(handed.draped.as_ref().is_some_and(|draped| draped.score > 0.9));
-    // Half a pixel of either camera at this size: a hazcam's pixel is 1.5 cm wide there.
+    // Half a pixel of either camera at this size: a hazcam pixel is 1.5 cm wide at that range.
     for (trace, limit_m) in [(mast, 0.004), (hazcam, 0.008)] {
         assert_eq!(trace.update.state, TrackingState::Tracking, "step {}", trace.step);
         assert!(error_m(trace) < limit_m, "step {}: {} m", trace.step, error_m(trace));
@@ -80,7 +80,7 @@ fn features_are_followed_on_the_way_and_the_shape_is_asked_at_the_end_and_hands_
 }
 
 #[test]
-fn a_drive_without_features_is_dead_reckoned_and_the_shape_finds_the_target_at_its_end() {
+fn shape_finds_the_target_after_dead_reckoning() {
     let mut settings = combined();
     settings.features = FeatureSettings { features_max: 3, ..settings.features };
     let steps = run(&settings);
@@ -93,7 +93,7 @@ fn a_drive_without_features_is_dead_reckoned_and_the_shape_finds_the_target_at_i
 }
 
 #[test]
-fn a_target_lost_beyond_the_basin_is_not_handed_over_as_if_it_stood_where_it_is_thought_to_be() {
+fn a_target_beyond_the_basin_is_not_handed_off() {
     let mut settings = combined();
     settings.features = FeatureSettings { features_max: 3, ..settings.features };
     let staged = Staged::new(&SCENE.traverse, Visit::Every(1)).with_position_jump(0.4);
@@ -117,7 +117,7 @@ fn the_shape_tracker_registers_every_stop_to_the_first_view() {
 
 #[test]
 fn the_same_drive_gives_the_same_bits() {
-    // As text, in which nothing that is not a number differs from itself.
+    // Compared as text, in which NaN equals NaN.
     let text = || serde_json::to_string(&run(&combined())).unwrap();
     assert!(text() == text());
 }
@@ -130,7 +130,7 @@ fn the_half_width_of_the_rock_is_measured_on_its_first_surface() {
 }
 
 #[test]
-fn on_a_flat_wall_the_shape_tracker_says_what_is_missing() {
+fn the_shape_tracker_rejects_a_flat_wall_with_a_reason() {
     let wall =
         PlaneWorld::new((0..3).map(|stop| Pose::translation(0.4 * f64::from(stop), 0.0, 0.0)).collect());
     let settings = Settings { tracker: TrackerKind::Shape, ..Settings::default() };
@@ -147,7 +147,7 @@ fn on_a_flat_wall_the_shape_tracker_says_what_is_missing() {
 }
 
 #[test]
-fn a_stop_knows_when_its_cameras_are_the_last_of_their_kind() {
+fn shape_is_measured_at_the_last_stops_of_both_pairs() {
     let steps = run(&combined());
     let asked: Vec<bool> = steps[1..].iter().map(|trace| trace.shape().unwrap().surface.is_some()).collect();
     let expected: Vec<bool> = (1..steps.len()).map(|step| step + 2 >= steps.len()).collect();

@@ -1,7 +1,7 @@
-//! A real hand-off: Opportunity's navcam, which turned its mast and so saw the ground from two places 6.7 cm apart, and her
-//! front hazcam, which looked from the same rover position three sols before.
+//! A real hand-off: Opportunity's navcam, whose mast turned and so saw the ground from two positions 6.7 cm apart, and her
+//! front hazcam, from the same rover position three sols earlier.
 //!
-//! A test whose images are missing is left out (see `sightline_testdata`).
+//! A test without its images is skipped (see `sightline_testdata`).
 
 use sightline_track::locate::shape_tracker::view::View;
 use std::collections::BTreeMap;
@@ -40,7 +40,7 @@ fn frame(path: &Path) -> (Camera, Arc<GrayImage>) {
     (product.camera().unwrap(), Arc::new(image))
 }
 
-/// Left pixel and point (rover frame, m) of the set's matches, made with OpenCV's SIFT and triangulated with the labels.
+/// Left pixel and point (rover frame, m) of the set's matches, from OpenCV's SIFT and triangulated with the labels.
 fn matches(folder: &Path) -> Vec<(Pixel, Point3)> {
     let text = std::fs::read_to_string(folder.join("reference_matches.csv")).unwrap();
     let row = |line: &str| -> Option<(Pixel, Point3)> {
@@ -51,7 +51,7 @@ fn matches(folder: &Path) -> Vec<(Pixel, Point3)> {
     text.lines().filter_map(row).collect()
 }
 
-/// The ground through points as z = a x + b y + c, those more than 0.3 m off it left out after a first fit.
+/// Fits the ground z = a x + b y + c to points, without those more than 0.3 m off after a first fit.
 fn ground(points: &[Point3]) -> nalgebra::Vector3<f64> {
     let fit = |points: &[&Point3]| {
         let rows = nalgebra::DMatrix::from_fn(points.len(), 3, |i, k| [points[i].x, points[i].y, 1.0][k]);
@@ -68,7 +68,7 @@ fn ground(points: &[Point3]) -> nalgebra::Vector3<f64> {
     fit(&near)
 }
 
-/// The ground around a target as the left navcam sees it, 2 cm between points.
+/// The ground around a target as seen by the left navcam, with points 2 cm apart.
 fn mesh(ground: &nalgebra::Vector3<f64>, target: &Point3, viewpoint: &Point3) -> Mesh {
     let mut grid = PointGrid::empty(101, 101);
     for row in 0..101 {
@@ -83,14 +83,14 @@ fn mesh(ground: &nalgebra::Vector3<f64>, target: &Point3, viewpoint: &Point3) ->
 }
 
 #[test]
-fn a_mast_that_turned_moved_along_its_line_of_sight_so_that_rows_cannot_be_aligned() {
+fn mast_rotation_along_the_view_prevents_rectification() {
     let Some(folder) = set() else { return };
     let [(left, left_image), (right, right_image)] = NAVCAM.map(|name| frame(&folder.join(name)));
     let (from, to) = (left.model.centre(), right.model.centre());
     let along = (to - from).normalize().dot(&right.model.axis()).acos().to_degrees();
     println!("baseline {:.1} mm, {along:.0} deg off the second view's axis", 1000.0 * (to - from).norm());
     assert!(((to - from).norm() - 0.067).abs() < 0.002 && along < 15.0);
-    // The epipole is in the picture: no turn of the cameras makes the rows agree, and nothing is invented.
+    // The epipole is inside the image: no rotation of the cameras aligns the rows, and no surface is returned.
     let pair = StereoPair { left: left_image, right: right_image };
     let settings = StereoSettings { range_min_m: 2.0, ..StereoSettings::default() };
     let found = StopSurface::measure(&pair, [&left, &right], &settings, Cancel::default())
@@ -98,7 +98,7 @@ fn a_mast_that_turned_moved_along_its_line_of_sight_so_that_rows_cannot_be_align
     assert!(found < 1000, "{found} points");
 }
 
-/// A target as the left navcam saw it, known to 10 cm.
+/// The view of a target by the left navcam, with a 1σ of 10 cm.
 fn view(target: Point3, mesh: Mesh, left: &Camera, image: &Arc<GrayImage>) -> View {
     View {
         step: 0,
@@ -114,7 +114,7 @@ fn view(target: Point3, mesh: Mesh, left: &Camera, image: &Arc<GrayImage>) -> Vi
 }
 
 #[test]
-fn the_hazcam_sees_the_ground_of_the_navcams_pair_edge_on_and_no_target_is_handed_over_falsely() {
+fn no_false_hand_off_on_ground_seen_edge_on() {
     let Some(folder) = set() else { return };
     let (left, left_image) = frame(&folder.join(NAVCAM[0]));
     let (hazcam, hazcam_image) = frame(&folder.join(HAZCAM));
@@ -126,7 +126,8 @@ fn the_hazcam_sees_the_ground_of_the_navcams_pair_edge_on_and_no_target_is_hande
     println!("ground z = {:.3} x + {:.3} y + {:.3}", ground[0], ground[1], ground[2]);
     let (mut seen, mut shifts, mut scores, mut why) = (0, Vec::new(), Vec::new(), BTreeMap::new());
     for (pixel, _) in &near {
-        // The target is where the line of sight meets the ground: its range by 6.7 cm of baseline is no better than 0.3 m.
+        // The target is the intersection of the line of sight with the ground: stereo with a baseline of 6.7 cm is no better
+        // than 0.3 m.
         let ray = left.ray(*pixel).unwrap();
         let normal = nalgebra::Vector3::new(ground[0], ground[1], -1.0);
         let distance_m = -(normal.dot(&ray.origin.coords) + ground[2]) / normal.dot(&ray.direction);
@@ -166,7 +167,7 @@ fn the_hazcam_sees_the_ground_of_the_navcams_pair_edge_on_and_no_target_is_hande
     println!("{seen} targets within 9 m are in the hazcam's image; {} found", shifts.len());
     println!("shift {:?} px, score {:?} (medians); else {why:?}", median(&shifts), median(&scores));
     assert!(seen > 50, "{seen}");
-    // Every target has an answer or a sentence. The hazcam stands half a metre above ground that is 5 m away and falls off.
+    // Every target has a result or a reason. The hazcam is half a metre above ground that is 5 m away and slopes down.
     assert_eq!(seen, shifts.len() + why.values().sum::<usize>());
     let edge_on: usize =
         why.iter().filter(|(kind, _)| kind.contains("edge-on")).map(|(_, count)| count).sum();

@@ -1,4 +1,4 @@
-//! A commanded drive that is paused between the stages of a stop has the bits of one that is never paused.
+//! A drive on commands that is paused between the stages of a stop has the same bits as one that is never paused.
 
 use sightline_geometry::cancel::Cancel;
 use sightline_rover::driving::executive::{self, CycleInput};
@@ -26,7 +26,7 @@ fn paused(drive: &TargetedDrive, last: &RunStep, before: Option<CycleStage>) -> 
         .unwrap()
 }
 
-/// Checks that the records of a paused step are those of the whole one up to the pause, and say nothing after it.
+/// Checks that the records of a paused step equal those of the whole one up to the pause, and are absent after it.
 fn check_prefix(begun: StepTrace, whole: &RunStep, before: CycleStage) {
     assert_eq!(begun.paused_before(), Some(before));
     assert_eq!(begun.update.state, whole.verdict().unwrap().state_before);
@@ -36,10 +36,10 @@ fn check_prefix(begun: StepTrace, whole: &RunStep, before: CycleStage) {
     let names = records::stages().iter().map(|stage| stage.schema().stage.as_ref());
     let all = names.zip(records::records(&begun)).zip(records::records(whole));
     let mut reached = Vec::new();
-    // The comparison against the truth and visual odometry are added by the session.
+    // The session adds visual odometry and the comparison with the truth.
     let added = ["step", "truth", "visual_odometry"];
     for ((name, begun), whole) in all.filter(|((name, _), _)| !added.contains(name)) {
-        // Evidence without a place of its own in the order belongs to `locate`.
+        // Evidence that is not in the order of the stages belongs to `locate`.
         let is_before = place(name).or(place("locate")) < place(before.word())
             || (before > CycleStage::Locate && place(name).is_none());
         if is_before {
@@ -58,7 +58,7 @@ fn check_prefix(begun: StepTrace, whole: &RunStep, before: CycleStage) {
 }
 
 #[test]
-fn a_step_paused_before_any_stage_is_the_prefix_of_the_whole_one() {
+fn a_paused_step_is_a_prefix_of_the_complete_step() {
     let folder = tempfile::tempdir().unwrap();
     let mut drive = begin(&folder.path().join("drive"));
     for _ in 0..2 {
@@ -72,7 +72,7 @@ fn a_step_paused_before_any_stage_is_the_prefix_of_the_whole_one() {
 }
 
 #[test]
-fn a_world_paused_before_any_stage_goes_on_with_the_same_state_and_images() {
+fn a_paused_world_resumes_with_the_same_state_and_images() {
     let folder = tempfile::tempdir().unwrap();
     let mut drive = begin(&folder.path().join("drive"));
     for _ in 0..2 {

@@ -1,7 +1,7 @@
-//! Disparities of recorded and rendered pairs beside the truth and OpenCV's (`tests/reference/stereo_reference.py` wrote the
-//! numbers and says how).
+//! Disparities of recorded and rendered pairs, compared with the truth and with OpenCV's
+//! (`tests/reference/stereo_reference.py` wrote the numbers and describes the method).
 //!
-//! A test whose recording is missing is left out (see `sightline_testdata`).
+//! A test without its recording is skipped (see `sightline_testdata`).
 
 use std::path::Path;
 
@@ -18,7 +18,7 @@ use sightline_vision::stereo::*;
 use sightline_world::truth::picture_truth;
 use sightline_world::{Eye, NoiseSeed, Scenario, World, index, render, true_camera_in_site};
 
-/// From here on a disparity is bad, px.
+/// Error above which a disparity is bad, px.
 const BAD_PX: f64 = 2.0;
 
 #[derive(Deserialize)]
@@ -27,7 +27,7 @@ struct Reference {
     street: Vec<StreetRow>,
 }
 
-/// What OpenCV finds of a street, and how much of that agrees with the next frame.
+/// OpenCV's density on the street, and its agreement with the next frame.
 #[derive(Deserialize)]
 struct StreetRow {
     matcher: String,
@@ -50,14 +50,14 @@ struct ReferenceRow {
     coverage: f64,
 }
 
-/// How good a map is, over the pixels that have a truth.
+/// Accuracy of a disparity map, over the pixels with ground truth.
 #[derive(Clone, Copy, Debug)]
 struct Quality {
-    /// Share without an answer, or off by more than 2 px.
+    /// Share without a disparity, or wrong by more than 2 px.
     bad2: f64,
-    /// Of those with an answer.
+    /// RMS error of the disparities found.
     rms_px: f64,
-    /// Share with an answer.
+    /// Share with a disparity.
     coverage: f64,
 }
 
@@ -75,7 +75,7 @@ fn quality(map: &DisparityMap, truth: &[f32]) -> Quality {
     Quality { bad2: bad / known, rms_px: (squares / answered).sqrt(), coverage: answered / known }
 }
 
-/// 0.299 R + 0.587 G + 0.114 B, rounded to 8 bits, as the other side has it.
+/// 0.299 R + 0.587 G + 0.114 B, rounded to 8 bits, as in the reference program.
 fn grey(path: &Path) -> GrayImage {
     let colour = image::open(path).unwrap().into_rgb8();
     GrayImage::from_fn(colour.width(), colour.height(), |x, y| {
@@ -84,7 +84,7 @@ fn grey(path: &Path) -> GrayImage {
     })
 }
 
-/// The numbers of a PFM file of one channel, little endian, from the top row down.
+/// The values of a PFM file of one channel, little endian, from the top row down.
 fn portable_floatmap(path: &Path, width: usize) -> Vec<f32> {
     let bytes = std::fs::read(path).unwrap();
     let words: Vec<&[u8]> = bytes.splitn(4, |byte| *byte == b'\n').collect();
@@ -94,7 +94,7 @@ fn portable_floatmap(path: &Path, width: usize) -> Vec<f32> {
     values.chunks_exact(width).rev().flatten().copied().collect()
 }
 
-/// Our two methods beside their counterparts; every figure no worse.
+/// Compares our two methods with their OpenCV counterparts; asserts that no figure is worse.
 fn compare(pair: &str, [left, right]: [&GrayImage; 2], truth: &[f32]) {
     let rows: Vec<ReferenceRow> = reference().rows.into_iter().filter(|row| row.pair == pair).collect();
     assert!(!rows.is_empty(), "{pair}");
@@ -134,7 +134,8 @@ fn a_motorcycle_is_matched_no_worse_than_by_opencv() {
 /// Size of the rendered pair, px.
 const SIZE: [u32; 2] = [400, 300];
 
-/// The third last stop of the demonstration as aligned cameras see it, with noise, in 8 bits; its true disparities, infinite for the sky.
+/// The third last stop of the demonstration, rendered for aligned cameras, with noise, 8 bits; its true disparities (sky:
+/// ∞).
 fn rendered() -> ([GrayImage; 2], Vec<f32>) {
     let mut scenario = Scenario::demo();
     scenario.camera.samples_per_axis = 3;
@@ -178,7 +179,8 @@ fn write_pair(folder: &Path, [left, right]: [&GrayImage; 2], truth: &[f32]) {
     std::fs::write(folder.join("disparity.f32"), bytes).unwrap();
 }
 
-/// Points of one frame, carried by the known motion, beside those of the next one: shares within 1 px and 3 px.
+/// Shares of points of one frame whose disparity in the next frame, predicted by the known motion, agrees within 1 px and 3
+/// px.
 fn reprojected(stereo: [&DenseStereo; 2], after_from_before: &Pose) -> [f64; 2] {
     let (mut compared, mut within) = (0.0, [0.0; 2]);
     let [before, after] = stereo;
@@ -201,7 +203,7 @@ fn reprojected(stereo: [&DenseStereo; 2], after_from_before: &Pose) -> [f64; 2] 
 }
 
 #[test]
-fn a_street_is_consistent_from_eye_to_eye_and_from_frame_to_frame() {
+fn street_stereo_is_consistent_between_eyes_and_frames() {
     let Some(folder) = recorded("kitti-seq1-frames-0-19", "the consistency of disparities") else { return };
     let frames = [0, 1].map(|frame| {
         ["image_0", "image_1"]
@@ -235,7 +237,7 @@ fn a_street_is_consistent_from_eye_to_eye_and_from_frame_to_frame() {
             theirs.within_1,
             theirs.within_3,
         );
-        // Half a percent is a few hundred points, as many as change sides with a setting.
+        // Half a percent is a few hundred points, about as many as a change of a setting affects.
         assert!(share(Outcome::Found) > 0.6 && within_3 > theirs.within_3 - 0.005, "{method:?}");
     }
 }

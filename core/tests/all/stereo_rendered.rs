@@ -1,4 +1,4 @@
-//! Points of rendered pairs beside the surface that the pixels truly show.
+//! Points of rendered pairs, compared with the true surface at the pixels.
 
 use sightline_geometry::camera::Camera;
 use sightline_geometry::frames::Pixel;
@@ -9,7 +9,7 @@ use sightline_world::scenario::CameraRig;
 use sightline_world::truth::pixel_truth;
 use sightline_world::{Eye, NoiseSeed, Scenario, World, index, render, true_camera_in_site};
 
-/// The pair of a stop of the demonstration, with noise, and its cameras in the site.
+/// The pair of a stop of the demonstration, with noise, and its cameras in the site frame.
 fn rendered(rig: Option<CameraRig>, size: u32) -> (World, [GrayImage; 2], [Camera; 2]) {
     let mut scenario = Scenario::demo();
     scenario.camera.image_size = size;
@@ -47,7 +47,7 @@ fn points_of_real_cameras_lie_on_the_surface_that_they_show() {
                 let Some(truth) = truth else { continue };
                 seen += 1;
                 let Some(point) = stereo.point(x, y) else { continue };
-                // Along the ray an error of range is one of disparity: where both appear in the right image.
+                // An error along the ray is measured as the distance of the two projections into the right image.
                 let pixels = right_camera.project(&truth).zip(right_camera.project(&point));
                 off_px.push(pixels.map_or(99.0, |(a, b): (Pixel, Pixel)| a.distance(b)));
             }

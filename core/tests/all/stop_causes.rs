@@ -1,4 +1,5 @@
-//! Drives that stop for one injected cause: the explanation names it, without scenario or truth, and its changes hold.
+//! Drives that stop for one injected cause: the explanation names it, without scenario or truth, and its changes are
+//! verified.
 
 use std::path::Path;
 
@@ -18,7 +19,7 @@ fn scenario(name: &str) -> Scenario {
     scenario
 }
 
-/// Hazard avoidance towards a goal on which tracking, at this size of the images, has no influence.
+/// Hazard avoidance towards a fixed goal, on which tracking in images of this size has no influence.
 fn avoiding() -> DriveCommand {
     DriveCommand {
         navigator: NavigatorKind::Gestalt,
@@ -55,7 +56,7 @@ fn a_slope_beyond_the_limit_is_named() {
 }
 
 #[test]
-fn a_reflection_is_told_from_a_rock_by_what_earlier_stops_measured() {
+fn earlier_measurements_distinguish_reflection_from_rock() {
     let why = explained(&scenario("false-obstacle"), avoiding());
     assert_eq!(why.cause, Some(StopCause::FalseObstacle), "{}", why.sentence);
 }
@@ -76,7 +77,7 @@ fn ground_without_texture_is_named_where_odometry_refuses() {
 }
 
 #[test]
-fn a_drive_that_repeats_itself_beside_its_goal_is_named_with_the_tolerance_that_ends_it() {
+fn oscillation_at_the_goal_names_the_sufficient_tolerance() {
     let scenario = scenario("slope-oblique");
     let why =
         explained(&scenario, DriveCommand { tolerance_m: 0.001, stops_max: 60, ..DriveCommand::default() });
@@ -87,13 +88,13 @@ fn a_drive_that_repeats_itself_beside_its_goal_is_named_with_the_tolerance_that_
 }
 
 #[test]
-fn a_slip_check_after_the_time_was_used_up_is_an_order_of_events() {
+fn a_slip_check_after_the_time_limit_is_an_order_of_events() {
     let folder = tempfile::tempdir().unwrap();
     let scenario = scenario("approach-10");
     let command = DriveCommand { goal: GoalRule::Fixed, stops_max: 5, ..DriveCommand::default() };
     let free = drive(&scenario, command.clone(), &folder.path().join("free"));
     let cycle = &free.cycles[2];
-    // The time ends with nine tenths of this motion to go.
+    // The time limit is reached with nine tenths of this motion left.
     let minutes = cycle.flight_minutes - 0.9 * cycle.report.unwrap().duration_s / 60.0;
     let limited = DriveCommand { flight_minutes_max: minutes, slip_max: 0.7, ..command };
     let of_command = DriveCommand { slip_check: SlipCheck::Command, ..limited.clone() };
@@ -104,7 +105,7 @@ fn a_slip_check_after_the_time_was_used_up_is_an_order_of_events() {
     assert_eq!((why.reason, why.cause), (StopReason::Slip, Some(StopCause::OrderOfEvents)));
     let of_wheels = why.changes.iter().find(|change| change.text == "slip_check wheels instead of command");
     assert_eq!(of_wheels.unwrap().decision, "time on Mars used up");
-    // Under that change the drive ends for its time, without a cause beside it.
+    // With that change the drive ends because of the time limit alone.
     let mut by_wheels = drive(&scenario, limited, &folder.path().join("wheels"));
     let why = by_wheels.why().unwrap();
     assert_eq!((why.reason, why.cause), (StopReason::Time, None));

@@ -1,4 +1,4 @@
-//! The template tracker over a world whose truth is a formula.
+//! The template tracker in a world with an analytic ground truth.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -40,7 +40,7 @@ pub(super) fn run(world: &PlaneWorld, changes: &[(&str, serde_json::Value)]) -> 
 }
 
 #[test]
-fn an_approach_stays_within_a_tenth_of_a_pixel_a_step_and_a_few_millimetres() {
+fn approach_errors_are_below_a_tenth_of_a_pixel_per_step() {
     let steps = run(&PlaneWorld::new(approach()), &[]);
     assert_eq!(steps.len(), 6);
     for step in &steps[1..] {
@@ -62,7 +62,7 @@ fn an_approach_stays_within_a_tenth_of_a_pixel_a_step_and_a_few_millimetres() {
 #[test]
 fn wild_pose_is_lost_with_the_distances_as_its_reason() {
     let mut world = PlaneWorld::new(approach());
-    // The blur before shrinking by 150,000 would have a kernel of 450,000 px.
+    // The blur before a reduction by 150,000 would have a kernel of 450,000 px.
     world.estimates[2].translation.vector.x -= 1e6;
     let steps = run(&world, &[]);
     assert_eq!(steps[2].update.state, TrackingState::Lost { count: 1 });
@@ -102,7 +102,7 @@ fn backing_away_shrinks_the_template_and_finds_the_point_again() {
 }
 
 #[test]
-fn a_template_rolled_by_ten_degrees_is_found_with_roll_and_scores_worse_without() {
+fn roll_correction_finds_a_template_rolled_by_ten_degrees() {
     let world = PlaneWorld::new(vec![pose(0.0, 0.0), pose(0.7, 10.0)]);
     let with = run(&world, &[]);
     let without = run(&world, &[("roll", json!(false))]);
@@ -123,7 +123,7 @@ fn scaling_matters_for_a_step_of_a_quarter_of_the_distance() {
     assert!(without[1].row().ncc.unwrap() < with[1].row().ncc.unwrap() - 0.1);
 }
 
-/// A plane turned away by 65°, seen from two places 1.2 m apart across, both of which look at its middle.
+/// A plane turned away by 65°, seen from two positions 1.2 m apart sideways, both looking at its centre.
 pub(super) fn turned_plane() -> PlaneWorld {
     let attitude = attitude_from_roll_pitch_yaw(0.0, 0.0, (-1.2_f64).atan2(7.2));
     let aside = Pose::from_parts(Vector3::new(0.8, 1.2, 0.0).into(), attitude);
@@ -134,7 +134,7 @@ pub(super) fn turned_plane() -> PlaneWorld {
 }
 
 #[test]
-fn a_surface_turned_away_is_found_through_its_slope_and_worse_by_scale_and_roll_alone() {
+fn slope_warping_finds_an_oblique_surface_better() {
     let world = turned_plane();
     let by_slope = run(&world, &[]);
     let alone = run(&world, &[("surface_warp", json!(false))]);
@@ -145,7 +145,7 @@ fn a_surface_turned_away_is_found_through_its_slope_and_worse_by_scale_and_roll_
             .map(|s| (s.warped, s.misfit().norm()))
             .unwrap()
     };
-    // 11° around a plane seen at 65°: its image widens by a third beside the scale.
+    // 11° around a plane seen at 65°: its image widens by a third in addition to the scale.
     assert!(prepared(&alone).1 > 0.25 && !prepared(&alone).0, "{:?}", prepared(&alone));
     assert!(prepared(&by_slope).0 && prepared(&by_slope).1 < 1e-12, "{:?}", prepared(&by_slope));
     assert!(by_slope[1].row().ncc.unwrap() > 0.98, "{:?} {:?}", by_slope[1].row(), alone[1].row());
@@ -154,14 +154,14 @@ fn a_surface_turned_away_is_found_through_its_slope_and_worse_by_scale_and_roll_
 }
 
 #[test]
-fn stereo_on_a_surface_turned_away_scores_better_through_its_slope() {
+fn slope_warping_improves_stereo_on_oblique_surfaces() {
     let score =
         |on: bool| run(&turned_plane(), &[("surface_warp", json!(on))])[1].row().stereo_score.unwrap();
     assert!(score(true) > 0.999 && score(false) < score(true), "{} {}", score(true), score(false));
 }
 
 #[test]
-fn the_template_is_kept_until_it_must_be_magnified_by_three_tenths() {
+fn the_template_is_reused_up_to_a_magnification_of_1_3() {
     let stops = |policy: &str| -> Vec<usize> {
         run(&PlaneWorld::new(approach()), &[("template_update", json!(policy))])
             .iter()
@@ -175,11 +175,11 @@ fn the_template_is_kept_until_it_must_be_magnified_by_three_tenths() {
 }
 
 #[test]
-fn a_template_that_is_kept_chains_no_errors() {
+fn a_reused_template_does_not_chain_errors() {
     let steps = run(&PlaneWorld::new(approach()), &[("template_update", json!("never"))]);
     let drift = steps[5].update.target.memory.template().unwrap().drift;
     assert_eq!(drift.covariance_px2, nalgebra::Matrix2::zeros());
-    // The located position carries the error of its own match, and of no other.
+    // The located position has the error of its own match only.
     let matched = steps[5].template().and_then(|e| e.match_template.as_ref()).unwrap();
     let left_error = steps[5].located().unwrap().left_error;
     assert!((left_error.covariance_px2 - matched.covariance_px2).norm() < 1e-12);
@@ -187,22 +187,22 @@ fn a_template_that_is_kept_chains_no_errors() {
 }
 
 #[test]
-fn a_match_far_from_the_prediction_must_score_more() {
+fn a_match_far_from_the_prediction_needs_a_higher_score() {
     let mut world = PlaneWorld::new(approach());
-    // The estimate turns by 3° at the third stop: 31 px, where the prediction is known to some 4 px.
+    // The estimate turns by 3° at the third stop: 31 px, with a 1σ of the prediction of about 4 px.
     let jump = pose(0.0, 0.0).rotation * attitude_from_roll_pitch_yaw(0.0, 0.0, 3_f64.to_radians());
     world.estimates[2] = Pose::from_parts(world.estimates[2].translation, jump);
     let reason = |steps: &[RunStep]| steps[2].row().reason.unwrap_or_default();
     let believed = run(&world, &[]);
     assert_eq!(believed[2].update.state, TrackingState::Tracking, "{}", reason(&believed));
-    // The plane is without noise: scaled and rolled, its window would score 1.
+    // The plane has no noise: with scale and roll, its window would score 1.
     let doubted = run(&world, &[("far_ncc_min", json!(1.0)), ("scale", json!(false))]);
     assert!(
         doubted[2].update.state.is_lost() && reason(&doubted).contains("far_ncc"),
         "{}",
         reason(&doubted)
     );
-    // No place near the prediction looks like the target; with a large factor, one of them is taken all the same.
+    // No place near the prediction resembles the target; with a large factor, one of them is chosen nevertheless.
     let matched = |factor: f64| {
         let changes = [
             ("far_miss_factor", json!(factor)),
@@ -215,7 +215,7 @@ fn a_match_far_from_the_prediction_must_score_more() {
     let (far, near) = (matched(2.0), matched(1000.0));
     assert!(far.pixel.distance(near.pixel) > 10.0, "{:?} {:?}", far.pixel, near.pixel);
     assert!(far.second_peak.unwrap().ratio < 1.0 && near.second_peak.unwrap().ratio > 1.0);
-    // Where the prediction is right, the criterion is not asked.
+    // If the prediction is correct, this gate does not apply.
     assert_eq!(doubted[1].update.state, TrackingState::Tracking);
 }
 
@@ -223,7 +223,7 @@ fn a_match_far_from_the_prediction_must_score_more() {
 fn a_pick_whose_stereo_match_is_below_its_limit_is_warned_of() {
     use sightline_track::locate::template::warnings::WarningKind;
     let kinds = |limit: f64| -> Vec<WarningKind> {
-        // Without its slope the two views of a turned plane are a little unlike.
+        // Without the slope, the two views of a turned plane differ slightly.
         let steps = run(&turned_plane(), &[("stereo_ncc_min", json!(limit)), ("surface_warp", json!(false))]);
         assert!(!steps[0].row().fault);
         steps[0].template().unwrap().warnings.iter().map(|warning| warning.kind).collect()
@@ -245,7 +245,7 @@ fn a_pick_whose_stereo_match_does_not_lead_back_is_warned_of() {
 }
 
 #[test]
-fn a_missing_image_spoils_its_own_step_and_tracking_goes_on() {
+fn tracking_continues_after_a_missing_image() {
     let mut world = PlaneWorld::new(approach());
     world.troubles[2] = Trouble::Missing;
     let steps = run(&world, &[("template_update", json!("every_update"))]);
@@ -264,14 +264,14 @@ fn covered_eyes_lose_the_target_and_it_is_found_again_after_two() {
     assert_eq!(states[2], TrackingState::Lost { count: 1 });
     assert_eq!(states[3], TrackingState::Lost { count: 2 });
     assert_eq!(states[4], TrackingState::Tracking);
-    // While lost the template stays, the position is carried (R92).
+    // While the target is lost, the template stays and dead reckoning moves the position (R92).
     assert_eq!(steps[3].update.target.memory.template_step().unwrap(), 1);
     assert!(steps[2].verdict().unwrap().reason.as_ref().unwrap().contains("ncc"));
     assert!(steps[4].truth.as_ref().unwrap().err_px.unwrap() < 0.5);
 }
 
 #[test]
-fn three_covered_stops_are_a_failure_that_stays_although_the_evidence_is_right() {
+fn three_covered_stops_are_a_permanent_failure() {
     let mut world = PlaneWorld::new(approach());
     (world.troubles[2], world.troubles[3], world.troubles[4]) =
         (Trouble::Covered, Trouble::Covered, Trouble::Covered);
@@ -284,7 +284,7 @@ fn three_covered_stops_are_a_failure_that_stays_although_the_evidence_is_right()
 }
 
 #[test]
-fn a_wrong_pose_estimate_moves_the_prediction_but_not_the_result() {
+fn a_wrong_pose_moves_the_prediction_but_not_the_result() {
     let mut world = PlaneWorld::new(approach());
     for (i, estimate) in world.estimates.iter_mut().enumerate() {
         *estimate = Pose::from_parts(Vector3::new(0.0, 0.02 * i as f64, 0.0).into(), estimate.rotation)
@@ -328,7 +328,7 @@ fn half_pixel_noise_is_the_papers_covariance_of_a_stereo_point() {
 }
 
 #[test]
-fn the_left_right_check_is_a_criterion_only_where_its_limit_is_set() {
+fn the_left_right_check_is_a_gate_only_with_a_limit() {
     let world = PlaneWorld::new(approach());
     let gates =
         |limit: f64| run(&world, &[("left_right_max_px", json!(limit))])[1].verdict().cloned().unwrap().gates;

@@ -1,4 +1,4 @@
-//! Every configuration of the matcher over a world whose truth is a formula.
+//! Every configuration of the template matcher in a world with an analytic ground truth.
 
 use std::sync::Arc;
 
@@ -21,13 +21,13 @@ fn err_px(step: &RunStep) -> f64 {
     step.truth.as_ref().unwrap().err_px.unwrap()
 }
 
-/// Two stops a twentieth of the distance apart.
+/// Two stops; the second is closer by a twentieth of the distance.
 fn one_step() -> PlaneWorld {
     PlaneWorld::new(vec![pose(0.0, 0.0), pose(0.4, 0.0)])
 }
 
 #[test]
-fn every_measure_finds_the_target_and_is_judged_by_the_correlation_there() {
+fn every_similarity_measure_finds_the_target() {
     for (measure, lowest) in [("sad", -0.1), ("ssd", -0.1), ("sdog", 0.7)] {
         let steps = run(&one_step(), &[("measure", json!(measure))]);
         assert!(err_px(&steps[1]) < 0.2, "{measure}: {} px", err_px(&steps[1]));
@@ -43,7 +43,7 @@ fn every_measure_finds_the_target_and_is_judged_by_the_correlation_there() {
 }
 
 #[test]
-fn coarse_to_fine_finds_what_the_exhaustive_search_finds_and_visits_a_tenth() {
+fn coarse_to_fine_agrees_with_exhaustive_at_a_tenth_the_cost() {
     let all = run(&PlaneWorld::new(approach()), &[]);
     let few = run(&PlaneWorld::new(approach()), &[("search", json!("coarse_to_fine"))]);
     for (all, few) in all[1..].iter().zip(&few[1..]) {
@@ -87,14 +87,14 @@ fn the_affine_stage_follows_a_slope_that_scale_and_roll_do_not() {
     assert!(matched(&with[1]).score > 0.995, "{} {}", matched(&without[1]).score, matched(&with[1]).score);
     assert!(matched(&without[1]).score < matched(&with[1]).score - 0.05);
     assert!(err_px(&with[1]) < 0.1, "{} {}", err_px(&without[1]), err_px(&with[1]));
-    // Seen at 65° first and at 65° − atan(1.2 / 7.2) then, the plane widens by the ratio of the cosines.
+    // Seen at 65° first and then at 65° − atan(1.2 / 7.2), the plane widens by the ratio of the cosines.
     let wider = (65_f64.to_radians() - (1.2_f64 / 7.2).atan()).cos() / 65_f64.to_radians().cos();
     let truth = nalgebra::Matrix2::new(wider, 0.0, 0.0, 1.0);
     assert!((refined.map - truth).norm() < 0.02, "{} for {truth}", refined.map);
 }
 
 #[test]
-fn an_affine_map_that_changes_too_much_is_recorded_and_the_match_stands() {
+fn an_excessive_affine_map_is_recorded_but_not_used() {
     let plain = [("surface_warp", json!(false)), ("focus_px", json!(0.0))];
     let strict = [("refine", json!("affine")), ("refine_max_area_change", json!(0.01))];
     let with: Vec<(&str, Value)> = plain.iter().cloned().chain(strict).collect();
@@ -106,7 +106,7 @@ fn an_affine_map_that_changes_too_much_is_recorded_and_the_match_stands() {
 }
 
 #[test]
-fn klt_follows_small_steps_from_the_prediction_and_records_its_descent() {
+fn klt_follows_small_steps_and_records_its_descent() {
     for stage in ["klt_translation", "klt_affine"] {
         let steps =
             run(&PlaneWorld::new(approach()), &[("first_stage", json!(stage)), ("focus_px", json!(0.0))]);
@@ -119,9 +119,9 @@ fn klt_follows_small_steps_from_the_prediction_and_records_its_descent() {
 }
 
 #[test]
-fn klt_loses_a_target_that_the_prediction_misses_by_forty_pixels_and_correlation_does_not() {
+fn only_klt_loses_a_target_forty_pixels_off_prediction() {
     let mut world = one_step();
-    // 40 px at 7.3 m and 600 px.
+    // 40 px at 7.3 m and f = 600 px.
     world.estimates[1].translation.vector.y += 40.0 * 7.3 / 600.0;
     let klt = run(&world, &[("first_stage", json!("klt_translation")), ("tolerance_factor", json!(100.0))]);
     let correlated = run(&world, &[("tolerance_factor", json!(100.0))]);
@@ -130,7 +130,7 @@ fn klt_loses_a_target_that_the_prediction_misses_by_forty_pixels_and_correlation
 }
 
 #[test]
-fn a_brute_force_search_finds_scale_and_roll_without_the_geometry() {
+fn brute_force_search_finds_scale_and_roll() {
     let world = PlaneWorld::new(vec![pose(0.0, 0.0), pose(0.7, 5.0)]);
     let changes = [
         ("transform", json!("search")),
@@ -150,14 +150,14 @@ fn a_brute_force_search_finds_scale_and_roll_without_the_geometry() {
 }
 
 #[test]
-fn an_older_appearance_is_tried_and_its_drift_is_the_starts() {
+fn older_appearances_are_tried_and_carry_their_drift() {
     let changes = [("template_update", json!("every_update")), ("reference_templates", json!(3))];
     let steps = run(&PlaneWorld::new(approach()), &changes);
     let tried: Vec<_> = matched(&steps[4]).tried.iter().map(|t| (t.template_step, t.warped)).collect();
     assert_eq!(tried, [(3, true), (3, false), (2, true), (2, false), (1, true), (1, false)]);
     let best = matched(&steps[4]).tried.iter().filter_map(|t| t.focused_score).fold(-1.0, f64::max);
     assert_eq!(matched(&steps[4]).focused_score, Some(best));
-    // At stop 2 the designated window is among them; taken back to it, a match chains no other's error.
+    // At stop 2 the designated window is among them; back at it, a match adds no error of another match.
     let mut covered = PlaneWorld::new(approach());
     covered.true_poses[2] = covered.true_poses[1];
     covered.estimates[2] = covered.estimates[1];
@@ -172,7 +172,7 @@ fn an_older_appearance_is_tried_and_its_drift_is_the_starts() {
 }
 
 #[test]
-fn drift_correction_takes_the_chained_error_away_and_leaves_that_of_one_match() {
+fn drift_correction_leaves_the_error_of_one_match() {
     let changes = |policy: &str| [("template_update", json!(policy)), ("sub_pixel", json!(false))];
     let world = PlaneWorld::new(approach());
     let (chained, corrected) =
@@ -197,8 +197,7 @@ fn a_correction_that_moves_too_far_is_recorded_and_not_used() {
 }
 
 #[test]
-fn every_preset_tracks_a_facing_plane_in_steps_of_a_twentieth_but_for_the_shape_which_a_plane_does_not_have()
-{
+fn presets_track_a_facing_plane_except_by_shape() {
     let mut poses = vec![pose(0.0, 0.0)];
     while poses.len() < 4 {
         let x = poses[poses.len() - 1].translation.vector.x;
@@ -224,7 +223,7 @@ fn every_preset_tracks_a_facing_plane_in_steps_of_a_twentieth_but_for_the_shape_
 }
 
 #[test]
-fn the_eight_configurations_of_the_paper_are_scale_roll_and_affine_off_and_on() {
+fn the_eight_paper_presets_combine_scale_roll_and_affine() {
     for (scale, roll, affine) in [false, true].into_iter().flat_map(|s| {
         [false, true].into_iter().flat_map(move |r| [false, true].into_iter().map(move |a| (s, r, a)))
     }) {
@@ -261,7 +260,7 @@ fn settings_that_contradict_each_other_are_refused_by_name() {
 }
 
 #[test]
-fn a_target_without_contrast_is_refused_and_a_window_outside_the_image_is_a_loss() {
+fn a_flat_target_is_rejected_and_an_outside_window_is_a_loss() {
     let mut world = one_step();
     world.troubles[0] = Trouble::Covered;
     let refused =
@@ -269,7 +268,7 @@ fn a_target_without_contrast_is_refused_and_a_window_outside_the_image_is_a_loss
     let refused = refused.unwrap_err().to_string();
     assert!(refused.contains("no contrast") && refused.contains("template_size_px"), "{refused}");
     let mut world = one_step();
-    // The prediction is a metre and a half aside: beyond the image.
+    // The prediction is a metre and a half to the side: outside the image.
     world.estimates[1].translation.vector.y += 3.0;
     let steps = run(&world, &[]);
     let reason = steps[1].row().reason.unwrap();
@@ -303,7 +302,7 @@ fn each_gate_of_the_peak_is_a_named_loss_once_it_is_switched_on() {
 }
 
 #[test]
-fn a_facing_plane_is_picked_without_a_warning_and_a_grazing_one_with_its_depth_range() {
+fn only_a_grazing_plane_warns_of_its_depth_range() {
     let evidence = |world: &PlaneWorld| run(world, &[])[0].template().unwrap().clone();
     assert!(evidence(&one_step()).warnings.is_empty(), "{:?}", evidence(&one_step()).warnings);
     let warnings = evidence(&turned_plane()).warnings;
@@ -334,7 +333,7 @@ fn the_current_view_is_compared_with_every_earlier_template() {
 }
 
 #[test]
-fn with_the_height_term_the_right_maximum_agrees_in_relief_and_is_weighed_with_four_others() {
+fn the_height_term_selects_the_right_maximum() {
     let changes =
         [("height_weight", json!(0.5)), ("height_scale_m", json!(0.2)), ("search_window_px", json!(103))];
     let steps = run(&turned_plane(), &changes);

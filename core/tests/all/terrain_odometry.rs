@@ -1,4 +1,4 @@
-//! Planned drives whose poses vision corrects: on a steep slope, and with wheels that turn on the spot.
+//! Planned drives whose poses are corrected by vision: on a steep slope, and with wheels that spin in place.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use sightline_rover::visual_odometry::{OdometryMode, OdometryPreset};
 use sightline_world::scenario::Move;
 use sightline_world::{Scenario, library};
 
-/// A drive of the library in a world of small images, planned.
+/// A planned drive of the library, with small images.
 fn planned(name: &str, change: impl FnOnce(&mut Scenario), folder: &Path) -> Traverse {
     let mut scenario = Scenario { seed: 5311, ..library::scenario(name).unwrap() };
     (scenario.camera.image_size, scenario.camera.samples_per_axis) = (512, 2);
@@ -23,36 +23,41 @@ fn with(planned: &Traverse, mode: OdometryMode) -> Traverse {
 }
 
 /// Distance of the estimated position from the true one at the last stop, m.
-fn off_m(drive: &Traverse) -> f64 {
+fn position_error_m(drive: &Traverse) -> f64 {
     let last = drive.stop_count() - 1;
     let apart: Pose = drive.true_site_from_rover(last).unwrap().inverse() * drive.site_from_rover(last);
     apart.translation.vector.norm()
 }
 
 #[test]
-fn on_a_steep_slope_a_planned_drive_is_near_the_truth_with_odometry_alone() {
+fn odometry_alone_keeps_a_steep_drive_near_the_truth() {
     let folder = tempfile::tempdir().unwrap();
     let shorten = |scenario: &mut Scenario| scenario.drive.end_distance_m = 6.6;
     let planned = planned("slope-steep", shorten, folder.path());
     let index = std::fs::read(folder.path().join("traverse.toml")).unwrap();
     let [off, full] = [OdometryMode::Off, OdometryMode::Full].map(|mode| with(&planned, mode));
-    println!("{} m off, {} m full, {} stops", off_m(&off), off_m(&full), full.stop_count());
-    assert!(off_m(&off) > 0.2 && off_m(&full) < 0.03);
+    println!(
+        "{} m off, {} m full, {} stops",
+        position_error_m(&off),
+        position_error_m(&full),
+        full.stop_count()
+    );
+    assert!(position_error_m(&off) > 0.2 && position_error_m(&full) < 0.03);
     assert_eq!(off.index(), planned.index());
     for stop in 1..full.stop_count() {
         let measured = full.measured_motion(stop).unwrap();
         assert_eq!(measured.corrects, measured.update.accepted);
-        // A record normalizes its quaternion again, so the last bits may differ.
+        // A record normalises its quaternion again, so the last bits may differ.
         let after = measured.pose_after(&full.site_from_rover(stop - 1));
         let apart: Pose = full.site_from_rover(stop).inverse() * after;
         assert!(apart.rotation.angle() < 1e-12 && apart.translation.vector.norm() < 1e-12);
     }
-    // The folder stays as it is.
+    // The folder is unchanged.
     assert_eq!(std::fs::read(folder.path().join("traverse.toml")).unwrap(), index);
 }
 
 #[test]
-fn a_check_of_the_slip_ends_a_planned_drive_where_the_rover_is_stuck() {
+fn the_slip_check_ends_a_planned_drive_of_a_stuck_rover() {
     let folder = tempfile::tempdir().unwrap();
     let shorten = |scenario: &mut Scenario| {
         scenario.drive.moves = vec![Move::Forward { distance_m: 2.8, stops: 7 }];
@@ -62,8 +67,12 @@ fn a_check_of_the_slip_ends_a_planned_drive_where_the_rover_is_stuck() {
     assert_eq!((planned.stop_count(), checked.stop_count()), (8, 6));
     let slip = checked.measured_motion(5).unwrap().update.slip.unwrap().along;
     assert!((slip - 1.0).abs() < 0.05, "{slip}");
-    // The poses stay those of the wheels; full odometry drives on, and knows that the rover stood.
+    // The poses remain those of the wheels; full odometry continues, and detects that the rover did not move.
     assert!((0..6).all(|stop| checked.site_from_rover(stop) == planned.site_from_rover(stop)));
     let full = with(&planned, OdometryMode::Full);
-    assert!(full.stop_count() == 8 && off_m(&full) < 0.05 && off_m(&planned) > 0.4, "{}", off_m(&full));
+    assert!(
+        full.stop_count() == 8 && position_error_m(&full) < 0.05 && position_error_m(&planned) > 0.4,
+        "{}",
+        position_error_m(&full)
+    );
 }

@@ -1,4 +1,4 @@
-//! The criteria against pictures whose answer is known, and the map against a plane whose truth is exact.
+//! The criteria on images with known results, and the map on a plane with exact ground truth.
 
 use image::Luma;
 
@@ -31,7 +31,7 @@ fn window(value: impl Fn(u32, u32) -> f32) -> Patch {
 
 #[test]
 fn noise_is_measured_through_slopes_and_bends() {
-    // A pseudo-random ±1 has deviation 1; the bent ground under it has none for this mask.
+    // A pseudo-random ±1 has standard deviation 1; the mask removes the curved background.
     let sign = |x: u32, y: u32| {
         let mixed = (x.wrapping_mul(2_654_435_761) ^ y.wrapping_mul(40_503).wrapping_mul(97))
             .wrapping_mul(0x9e37_79b1);
@@ -58,12 +58,12 @@ fn a_match_is_uncertain_along_an_edge_and_certain_at_a_corner() {
 }
 
 #[test]
-fn a_repeated_pattern_looks_like_itself_elsewhere_and_a_lone_one_does_not() {
+fn only_a_repeated_pattern_has_a_second_match() {
     let spot = |x: f64, y: f64| (-(x * x + y * y) / 30.0).exp();
     let likeness = |places: &[(f64, f64)]| {
         let image = GrayImage::from_fn(200, 200, |x, y| {
             let spots: f64 = places.iter().map(|(u, v)| spot(f64::from(x) - u, f64::from(y) - v)).sum();
-            // A slow ramp keeps far windows from being flat.
+            // A slow ramp prevents far windows from being uniform.
             Luma([(0.2 + 0.4 * spots + 1e-4 * f64::from(x)) as f32])
         });
         let pixel = Pixel::new(100.0, 100.0);
@@ -86,7 +86,7 @@ fn a_depth_edge_is_a_step_beyond_any_slope_also_across_a_hole() {
     let step = map(&|x| if x < 30 { 20.0 } else { 26.0 });
     assert_eq!((at(&step, 29), at(&step, 30)), (0.0, 0.0));
     assert_eq!((at(&step, 20), at(&step, 37)), (9.0, 7.0));
-    // What stands in front hides a strip as wide as its disparity is larger.
+    // A nearer surface hides a strip as wide as the difference of the disparities.
     let hidden = map(&|x| match x {
         0..24 => 20.0,
         24..30 => f32::NAN,
@@ -123,7 +123,7 @@ fn every_aspect_has_a_letter_and_a_sentence_of_its_own() {
 }
 
 #[test]
-fn a_textured_plane_is_good_where_both_eyes_see_it_at_its_range_within_the_stated_error() {
+fn a_textured_plane_is_good_where_both_eyes_see_it() {
     let world = plane();
     let ground = ground(&world);
     let pixel = Pixel::new(140.0, 120.0);
@@ -134,14 +134,14 @@ fn a_textured_plane_is_good_where_both_eyes_see_it_at_its_range_within_the_state
     let error = (seen.range_m.unwrap() / truth_m - 1.0).abs();
     // One pixel of disparity in 15.6 at 7.7 m.
     assert!(error < stated && (0.06..0.07).contains(&stated), "{error} of {stated}");
-    // A plane across the line of sight is not foreshortened: the papers' rule is what limits the step.
+    // A plane across the line of sight is not foreshortened: the papers' rule limits the step.
     assert!((seen.longest_step_m.unwrap() - 0.1 * seen.range_m.unwrap()).abs() < 1e-9);
     let rim = ground.assess(Pixel::new(6.0, 120.0), false);
     assert_eq!((rim.verdict, rim.reason), (Verdict::Bad, Some(Aspect::Rim)));
 }
 
 #[test]
-fn what_is_good_at_a_pixel_is_accepted_by_the_designation() {
+fn a_good_pixel_is_accepted_by_the_designation() {
     let world = plane();
     let ground = ground(&world);
     for pixel in [Pixel::new(140.0, 120.0), Pixel::new(90.3, 180.6), Pixel::new(200.0, 60.0)] {
@@ -154,7 +154,7 @@ fn what_is_good_at_a_pixel_is_accepted_by_the_designation() {
 }
 
 #[test]
-fn a_bad_pixel_names_one_reason_and_the_nearest_good_one_which_can_be_designated() {
+fn a_bad_pixel_has_one_reason_and_the_nearest_good_pixel() {
     let world = plane();
     let ground = ground(&world);
     let verdict = PixelVerdict::of(&world, &ground, Pixel::new(3.0, 120.0));
@@ -162,14 +162,14 @@ fn a_bad_pixel_names_one_reason_and_the_nearest_good_one_which_can_be_designated
     assert!(verdict.reason.as_deref().unwrap().contains("rim"), "{verdict:?}");
     let good = verdict.nearest_good.expect("a good pixel");
     assert_eq!(PixelVerdict::of(&world, &ground, good).verdict, Verdict::Good);
-    // Nothing nearer on the map's grid is good.
+    // No closer cell of the map is good.
     let map = TrackabilityMap::of(&ground);
     let nearest = map.nearest_good(Pixel::new(3.0, 120.0)).unwrap();
     assert!(nearest.distance(Pixel::new(3.0, 120.0)) <= good.distance(Pixel::new(3.0, 120.0)) + 1e-9);
 }
 
 #[test]
-fn a_map_made_row_by_row_says_of_each_pixel_what_the_pixel_itself_says() {
+fn a_map_agrees_with_the_evaluation_of_each_pixel() {
     let world = plane();
     let ground = ground(&world);
     let whole = TrackabilityMap::of(&ground);
@@ -193,7 +193,7 @@ fn a_map_made_row_by_row_says_of_each_pixel_what_the_pixel_itself_says() {
 }
 
 #[test]
-fn where_nothing_is_seen_everything_is_bad_and_there_is_no_good_pixel() {
+fn without_texture_every_pixel_is_bad() {
     let mut world = plane();
     world.troubles = vec![Trouble::Covered];
     let ground = ground(&world);
@@ -216,7 +216,7 @@ fn the_expected_match_sigma_is_the_scatter_under_white_noise() {
     };
     let mut noisy = |side: u32| {
         GrayImage::from_fn(side, side, |x, y| {
-            // Twelve uniform numbers are nearly Gaussian with variance 1.
+            // The sum of twelve uniform numbers is nearly Gaussian with variance 1.
             let noise = (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
             let (u, v) = (f64::from(x) - f64::from(side / 2), f64::from(y) - f64::from(side / 2));
             Luma([(0.5 + 0.1 * (0.7 * u).sin() * (0.6 * v + 0.3).cos() + SIGMA * noise) as f32])

@@ -1,4 +1,4 @@
-//! The trackability map of convergent pairs against point stereo, as a designation uses it.
+//! The trackability map of convergent pairs, compared with point stereo as a designation uses it.
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -13,23 +13,23 @@ use sightline_testing::PlaneWorld;
 use sightline_track::settings::Settings;
 use sightline_track::target::Designation;
 
-/// Largest left–right distance of a match that counts, px.
+/// Largest left–right distance of a valid match, px.
 const LEFT_RIGHT_MAX_PX: f64 = 1.5;
 
-/// Largest difference of the disparities of neighbours that agree, px.
+/// Largest difference of the disparities of consistent neighbours, px.
 const AGREE_PX: f64 = 1.5;
 
-/// How many of the four neighbours must agree.
+/// Number of the four neighbours that must be consistent.
 const AGREE_MIN: usize = 3;
 
-/// The map's ranges against designations whose left–right check and neighbours agree.
+/// The map's ranges, compared with designations that pass the left–right check and have consistent neighbours.
 #[derive(Debug, Default)]
 struct Agreement {
-    /// Pixels at which point stereo has such a match.
+    /// Number of pixels with such a designation.
     matched: usize,
-    /// Those at which the map has a range.
+    /// Number of them at which the map has a range.
     both: usize,
-    /// Those whose two ranges agree.
+    /// Number of them at which both ranges agree.
     ranges_agree: usize,
 }
 
@@ -68,7 +68,7 @@ fn designated(stops: &dyn Stops, pixel: Pixel) -> Option<f64> {
     (stereo.left_right_px? <= LEFT_RIGHT_MAX_PX).then_some(1.0 / stereo.range_m)
 }
 
-/// The inverse range of a designation with which its neighbours agree, 1/m.
+/// The inverse range of a designation with consistent neighbours, 1/m.
 fn consistent(stops: &dyn Stops, pixel: Pixel) -> Option<f64> {
     let (inverse, product) = (designated(stops, pixel)?, product(stops, pixel));
     let neighbours = [(-6.0, 0.0), (6.0, 0.0), (0.0, -6.0), (0.0, 6.0)];
@@ -83,7 +83,7 @@ fn imported(set: &Path, folder: &Path) -> Traverse {
     Traverse::open(&pair).unwrap()
 }
 
-/// The plane seen by a camera whose mast turned by 0.08 rad, which moved it mostly along its line of sight.
+/// The plane seen by a camera whose mast turned by 0.08 rad, which moved it mainly along its line of sight.
 fn convergent_plane() -> PlaneWorld {
     let mut world = PlaneWorld::new(vec![Pose::identity()]);
     let (sine, cosine) = 0.08_f64.sin_cos();
@@ -123,7 +123,7 @@ fn a_convergent_pair_has_ranges_wherever_both_views_overlap() {
     let agreement = Agreement::of(&world, &ground, &cells);
     assert!(agreement.matched > 20 && agreement.recall() >= 0.95, "{agreement:?}");
     assert_eq!(agreement.both, agreement.ranges_agree, "{agreement:?}");
-    // The plane is smooth and textured: nothing speaks against most of it.
+    // The plane is smooth and textured: most of it passes all criteria.
     let [good, risky, _] = map.shares();
     assert!(good + risky > 0.4, "{:?}", map.shares());
     let outside = ground.assess(Pixel::new(12.0, 128.0), false);
@@ -151,7 +151,7 @@ fn the_overlap_of_the_opportunity_pair_is_not_a_stereo_hole() {
         *reasons.entry(format!("{:?} {:?}", seen.verdict, seen.reason)).or_insert(0) += 1;
     }
     println!("{all} matches: {reasons:?}");
-    // Most of the matches are too far away for so short a baseline: 57 % have a 3σ range error above a third.
+    // Most matches are too far away for so short a baseline: 57 % have a 3σ range error above a third.
     assert!(all > 100 && holes * 10 < all * 4, "{holes} of {all} are stereo holes");
     assert!(usable * 10 > all, "{usable} of {all} are usable");
     let cells = (760..1008).step_by(48).flat_map(|x| (340..1000).step_by(48).map(move |y| [x, y]));

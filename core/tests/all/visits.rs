@@ -1,4 +1,4 @@
-//! A drive to several targets in turn: all are tracked, a lost one is dropped, and the drive goes on.
+//! A drive to several targets in turn: all are tracked, a lost one is dropped, and the drive continues.
 
 use std::path::Path;
 
@@ -28,7 +28,7 @@ fn begin(scenario: &Scenario, (count, look_at_waiting): (usize, bool), folder: &
     TargetedDrive::begin_to(world, &targets, command, &Settings::default(), Cancel::default()).unwrap()
 }
 
-/// Drives until nothing is left to visit.
+/// Drives until no target is left to visit.
 fn to_end(drive: &mut TargetedDrive) {
     loop {
         while drive.advance(&Settings::default(), Cancel::default()).unwrap() {}
@@ -50,10 +50,10 @@ fn targets_are_visited_in_turn_and_a_lost_one_is_dropped() {
         assert!(visit.target_error_m.unwrap() < 0.03 && visit.goal_error_m.unwrap() < 0.05, "{visit:?}");
     }
     assert_eq!((second.since, second.until), (first.until, drive.steps.last().unwrap().step));
-    // While the rover drove to the first one, the second left the view of the mast's cameras and was carried.
+    // While the rover drove to the first target, the second left the view of the mast cameras; its position was propagated.
     let carried = drive.steps.iter().filter(|step| step.is_out_of_view()).count();
     assert!(carried > 0 && drive.steps[..first.until].iter().all(|step| !step.update.state.is_lost()));
-    // It was looked at on the way, at stops of their own.
+    // The mast looked at it on the way, at extra stops.
     let looks: Vec<usize> = drive.cycles[..first.until]
         .iter()
         .filter(|cycle| cycle.looks_at.is_some())
@@ -68,7 +68,7 @@ fn targets_are_visited_in_turn_and_a_lost_one_is_dropped() {
             "{step}"
         );
     }
-    // It is looked at before the rover drives to it: two stops at the place of the first goal.
+    // The mast looks at it before the rover drives to it: two stops at the place of the first goal.
     let [here, looked] = [first.until, first.until + 1].map(|step| &drive.steps[step]);
     assert!(here.is_out_of_view() && looked.why_not_searched().is_none());
     assert_eq!(drive.cycles[first.until].motion, None);
@@ -78,7 +78,7 @@ fn targets_are_visited_in_turn_and_a_lost_one_is_dropped() {
     while drive.advance(&Settings::default(), Cancel::default()).unwrap() {}
     assert!(drive.cycles.iter().all(|cycle| cycle.looks_at.is_none()) && drive.steps.len() <= first.until);
 
-    // From the stop at which it is looked at, a wall hides the second target until it is given up.
+    // From that stop on, a wall hides the second target until it is dropped.
     let mut hidden = scenario();
     let from_stop = u32::try_from(drive.steps.len()).unwrap();
     let wall =

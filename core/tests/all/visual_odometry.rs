@@ -1,4 +1,4 @@
-//! Visual odometry in simulated drives: the motion, its covariance, and refusals.
+//! Visual odometry in simulated drives: the motion, its covariance, and rejections.
 
 use sightline_geometry::camera::{Camera, CameraModel};
 use sightline_geometry::cancel::Cancel;
@@ -17,7 +17,7 @@ use sightline_world::scenario::{ForcedSlip, OdometryModel};
 use sightline_world::target_truth::TruthSource;
 use sightline_world::{Scenario, library};
 
-/// Two stops between which the wheels advance by 60 cm with this slip.
+/// Two stops between which the wheels turn by 60 cm, with this slip.
 fn two_stops(slip: f64, folder: &std::path::Path) -> DrivenTraverse {
     let mut scenario = Scenario { seed: 1234, ..library::scenario("approach-10").unwrap() };
     (scenario.camera.image_size, scenario.camera.samples_per_axis) = (512, 2);
@@ -64,7 +64,7 @@ fn of_pairs(
     })
 }
 
-/// Error of the motion against the truth: m and deg.
+/// Error of the motion against the truth, m and deg.
 fn error(traverse: &Traverse, found: &OdometryUpdate) -> [f64; 2] {
     let pose = |stop| TruthSource::true_site_from_rover(traverse, stop).unwrap();
     let truth = pose(1).inverse() * pose(0);
@@ -73,7 +73,7 @@ fn error(traverse: &Traverse, found: &OdometryUpdate) -> [f64; 2] {
 }
 
 #[test]
-fn the_motion_is_found_within_millimetres_whatever_the_wheels_say() {
+fn motion_is_within_millimetres_for_any_wheel_odometry() {
     for slip in [0.0, 0.5, 1.0, 1.25] {
         let folder = tempfile::tempdir().unwrap();
         let world = two_stops(slip, &folder.path().join("drive"));
@@ -95,7 +95,7 @@ fn the_motion_is_found_within_millimetres_whatever_the_wheels_say() {
 }
 
 #[test]
-fn the_flown_preset_finds_the_motion_whether_or_not_the_wheels_spin() {
+fn the_flown_preset_finds_the_motion_despite_wheel_slip() {
     let folder = tempfile::tempdir().unwrap();
     let flown = OdometryPreset::Mer2007.settings();
     let world = two_stops(0.05, &folder.path().join("firm"));
@@ -103,9 +103,9 @@ fn the_flown_preset_finds_the_motion_whether_or_not_the_wheels_spin() {
     assert!(found.accepted && found.coarse_search.is_none(), "{:?}", found.refusal());
     let [error_m, error_deg] = error(world.traverse(), &found);
     assert!(error_m < 0.01 && error_deg < 0.1, "{error_m} m, {error_deg}°");
-    // Corners are given in the whole image.
+    // Pixels of corners are those of the whole image.
     assert!(found.table.iter().any(|corner| corner.before_px[0] > 300.0));
-    // Of spinning wheels far points are predicted well enough; their motion leads to the near ones.
+    // With spinning wheels, far points are predicted well; their motion then predicts the near ones.
     let world = two_stops(1.0, &folder.path().join("stuck"));
     let found = between(world.traverse(), [0, 1], &flown, Cancel::default()).unwrap();
     assert!(found.accepted && error(world.traverse(), &found)[0] < 0.01, "{:?}", found.refusal());
@@ -126,7 +126,7 @@ fn a_pair_beside_itself_shows_no_motion() {
 }
 
 #[test]
-fn what_cannot_be_measured_is_refused_with_a_sentence() {
+fn unmeasurable_motion_is_rejected_with_a_reason() {
     let folder = tempfile::tempdir().unwrap();
     let world = two_stops(0.0, &folder.path().join("drive"));
     let traverse = world.traverse();
@@ -139,7 +139,7 @@ fn what_cannot_be_measured_is_refused_with_a_sentence() {
     let found = of_pairs(traverse, [0, 1], [&flat, &flat], &predicted, &settings, Cancel::default()).unwrap();
     assert!(!found.accepted && found.corners == 0 && found.after_from_before.is_none());
     assert_eq!(found.refusal().unwrap(), "no update: only 0 of 0 matches are inliers of a rigid transform");
-    // A motion that no wheel can have made fails the gate of the translation, by name, value and limit.
+    // A motion that wheels cannot cause fails the translation gate, with name, value and limit.
     let far = Pose::translation(-0.05, 0.0, 0.0);
     let pairs = [0, 1].map(|stop| traverse.capture(stop).unwrap());
     let strict = OdometrySettings { slip_max: 1.0, coarse_search: false, search_px: 100, ..settings };
@@ -205,7 +205,7 @@ fn the_study_converges_on_texture_and_is_never_silently_wrong() {
     let tracks = row(Scene::OwnTracks, 9103, 4);
     let fence = row(Scene::PicketFence, 9104, 3);
     let bare = row(Scene::Featureless, 9105, 3);
-    // Without the gate `odometry_repetition` two of these motions are of another period of the tracks.
+    // Without the gate `odometry_repetition`, two of these motions are wrong by a period of the tracks.
     let periods = row(Scene::PicketFence, 71214, 25);
     assert!(periods.refused > 0, "{periods:?}");
     assert_eq!((bare.converged, bare.refused), (0, bare.updates));

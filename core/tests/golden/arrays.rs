@@ -4,7 +4,7 @@ use sightline_track::trace::{ArrayName, StepTrace};
 
 use super::sheet::{Sheet, Value};
 
-/// The arrays whose name in golden lists is not the one of the record.
+/// The arrays whose name in golden lists differs from the one in the record.
 const NAMES: [(&str, ArrayName); 21] = [
     ("template_reference", ArrayName::REFERENCE),
     ("template_scaled", ArrayName::SCALED),
@@ -29,7 +29,7 @@ const NAMES: [(&str, ArrayName); 21] = [
     ("draped_match", ArrayName::DRAPED_MATCH),
 ];
 
-/// Writes the arrays that the step has, after their names on one line.
+/// Writes a line with the names of the step's arrays, then the arrays.
 pub(crate) fn all(sheet: &mut Sheet, trace: &StepTrace) {
     let is_named = |array: &ArrayName| NAMES.iter().any(|(_, known)| known == array);
     let others = ArrayName::all().filter(|array| !is_named(array)).map(|array| (array.word(), array));

@@ -1,4 +1,4 @@
-//! The cases of the golden lists: a drive and a configuration each.
+//! The cases of the golden lists: pairs of drive and configuration.
 
 use sightline_session::step::RunStep;
 use sightline_session::track;
@@ -20,7 +20,7 @@ pub(crate) struct Case {
     pub(crate) preset: &'static str,
     /// Changes to the preset, as `key=value`.
     changes: &'static [&'static str],
-    /// Stops that are tracked at most.
+    /// Maximum number of stops that are tracked.
     stops_max: usize,
 }
 
@@ -28,12 +28,12 @@ const fn case(name: &'static str, drive: DriveName, preset: &'static str) -> Cas
     Case { name, drive, preset, changes: &[], stops_max: 5 }
 }
 
-/// A variant of the template tracker: three stops show what differs.
+/// A variant of the template tracker: three stops suffice to show its differences.
 const fn variant(name: &'static str, preset: &'static str) -> Case {
     Case { name, drive: DriveName::Approach, preset, changes: &[], stops_max: 3 }
 }
 
-/// What no preset switches on: the height term, and the gates that are off by default.
+/// Parts that no preset enables: the height term, and the gates that are off by default.
 const OPTIONAL_PARTS: &[&str] = &[
     "height_weight=0.3",
     "left_right_max_px=1",
@@ -57,7 +57,7 @@ pub(crate) const CASES: &[Case] = &[
         name: "approach-three-templates",
         drive: DriveName::Approach,
         preset: "three-templates",
-        // By default this short drive never renews its template, so that there is only one.
+        // With the default, this short drive never renews its template, so that only one exists.
         changes: &["template_update=every_update"],
         stops_max: 4,
     },
@@ -85,7 +85,7 @@ pub(crate) const CASES: &[Case] = &[
 ];
 
 impl Case {
-    /// What the list holds, as one line.
+    /// The title of the list, one line.
     pub(crate) fn title(&self) -> String {
         let changes = self.changes.iter().map(|change| format!(", {change}")).collect::<String>();
         format!("drive {:?}, preset {}{changes}", self.drive, self.preset)
@@ -94,7 +94,7 @@ impl Case {
     /// Tracks the drive's target and returns the numbers of every stop.
     ///
     /// # Panics
-    /// Where the preset or a change does not exist.
+    /// If the preset or a change does not exist.
     pub(crate) fn compute(&self, drive: &Drive) -> Sheet {
         let settings = self.settings();
         let folder = drive.traverse.folder().display().to_string();

@@ -15,9 +15,9 @@ const TOLERANCE: f64 = 1e-5;
 pub(crate) struct Difference {
     /// The line's name.
     pub(crate) name: String,
-    /// Its value in the golden list; `None` where the line is new.
+    /// Its value in the golden list; `None` for a new line.
     pub(crate) expected: Option<String>,
-    /// Its value now; `None` where the line is missing.
+    /// Its current value; `None` for a missing line.
     pub(crate) actual: Option<String>,
 }
 

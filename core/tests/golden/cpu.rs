@@ -1,4 +1,4 @@
-//! The type of this machine's CPU, as far as it may change the last bits of a result.
+//! The type of this machine's CPU, as far as it can change the last bits of a result.
 
 /// Architecture, widest vector instructions in use, and model: lists with equal descriptions are compared bit for bit.
 pub(crate) fn description() -> String {
@@ -21,13 +21,13 @@ fn vector_instructions() -> &'static str {
     }
 }
 
-/// Those that the architecture always has.
+/// The vector instructions that the architecture always has.
 #[cfg(not(target_arch = "x86_64"))]
 fn vector_instructions() -> &'static str {
     "baseline"
 }
 
-/// Vendor, name, family and model number by the operating system, where it gives them in `/proc/cpuinfo`.
+/// Vendor, name, family and model number from `/proc/cpuinfo`, if the operating system has it.
 fn model() -> Option<String> {
     let text = std::fs::read_to_string("/proc/cpuinfo").ok()?;
     let field = |key: &str| {

@@ -1,7 +1,7 @@
 //! The drives of the golden lists: simulated ones, written as scenarios, and excerpts of recorded data.
 //!
-//! Simulated images are 512 pixels wide with 4 samples a pixel and noise from a fixed seed. The recorded data are not
-//! part of the repository: `$SIGHTLINE_DATA` names their folder, without it `../shared/data` beside the workspace.
+//! Simulated images are 512 pixels wide with 4 samples per pixel and noise from a fixed seed. The recorded data are not part
+//! of the repository: `$SIGHTLINE_DATA` names their folder, by default `../shared/data` beside the workspace.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -22,7 +22,7 @@ targets = { arrangement = "centre", count = 1, window_px = 11 }
 rocks.placed = [{ x_m = 0.0, y_m = 0.0, diameter_m = 1.0, height_m = 0.7, yaw_deg = 200.0, shape = "block" }]
 "#;
 
-/// The same from 6 m, with an estimated heading that jumps by 7° at the third stop.
+/// The same from 6 m, with a jump of the estimated heading by 7° at the third stop.
 const HEADING_JUMP: &str = r#"
 name = "golden heading jump"
 seed = 11
@@ -33,7 +33,7 @@ rocks.placed = [{ x_m = 0.0, y_m = 0.0, diameter_m = 1.0, height_m = 0.7, yaw_de
 rover.heading_jumps = [{ stop = 2, yaw_deg = 7.0 }]
 "#;
 
-/// The end of the drive of the library's `k9-5`: three stops of the mast's cameras, then the front hazcams.
+/// The end of the drive of the library's `k9-5`: three stops with the mast cameras, then the front hazcams.
 const HAND_OFF: &str = r#"
 name = "golden hand-off"
 seed = 1
@@ -48,17 +48,17 @@ rocks.placed = [{ x_m = 0.0, y_m = 0.0, diameter_m = 0.45, height_m = 0.35 }]
 pub(crate) enum DriveName {
     /// Simulated: an undisturbed approach.
     Approach,
-    /// The same images, of which the right one of the third stop is cut short.
+    /// The same images; the right image of the third stop is truncated.
     Damaged,
     /// Simulated: the estimated heading jumps.
     HeadingJump,
-    /// Simulated: other cameras take over at the last stop.
+    /// Simulated: hand-off to other cameras at the last stop.
     HandOff,
     /// Recorded: four frames of a KITTI sequence.
     Street,
-    /// Recorded: two views of Opportunity's navcam, the first and the second as left image in turn.
+    /// Recorded: two views of Opportunity's navcam; each is the left image in turn.
     Opportunity,
-    /// Recorded: the same of Spirit's navcam.
+    /// Recorded: the same with Spirit's navcam.
     Spirit,
 }
 
@@ -85,10 +85,10 @@ impl DriveName {
     /// Makes the drive below `root`.
     ///
     /// # Errors
-    /// The folder of the recorded data that the drive needs, where it is missing.
+    /// The folder of the missing recorded data.
     ///
     /// # Panics
-    /// Where the drive cannot be made although its data exist.
+    /// If the drive cannot be created although its data exist.
     pub(crate) fn open(self, root: &Path) -> Result<Drive, PathBuf> {
         match self {
             Self::Approach => Ok(simulated(APPROACH, &root.join("approach"))),
@@ -114,7 +114,7 @@ impl DriveName {
     }
 }
 
-/// The scenario's drive with its images and the target by the scenario's rule.
+/// The scenario's drive with its images, and the target by the scenario's rule.
 fn simulated(scenario: &str, folder: &Path) -> Drive {
     let scenario = Scenario::from_toml(scenario, Path::new("golden.toml")).expect("a valid scenario");
     let traverse = create_simulated(&scenario, folder).expect("a drive from the scenario");
@@ -126,7 +126,7 @@ fn simulated(scenario: &str, folder: &Path) -> Drive {
     Drive { traverse, pixel }
 }
 
-/// The drive in `whole`, which is made where it is missing, copied, with a damaged image.
+/// The drive in `whole`, created if it is missing, copied, with a damaged image.
 fn damaged(whole: &Path, folder: &Path) -> Drive {
     let Drive { traverse, pixel } = simulated(APPROACH, whole);
     let image = traverse.index().stops[2].right.image.clone();
@@ -158,7 +158,7 @@ fn recorded(set: &str) -> Result<PathBuf, PathBuf> {
     if folder.is_dir() { Ok(folder) } else { Err(folder) }
 }
 
-/// Two stops of two views, either of which is the left one in turn.
+/// Two stops from two views; each view is the left one in turn.
 fn in_turn([first, second]: [&str; 2]) -> ImportOptions {
     let files = [first, second, second, first].map(PathBuf::from).to_vec();
     // Each view is written twice, with the same pixels.

@@ -1,7 +1,7 @@
-//! The numbers of a step, under names of their own.
+//! The numbers of a step, with names that only the golden lists use.
 //!
-//! The extractor reads the typed results of the stages field by field. Its names come neither from the record's
-//! field names nor from its serialised form, so that they stay when the record changes.
+//! The extractor reads the typed results of the stages field by field. Its names are independent of the record's field names
+//! and of its serialised form, so that they remain valid when the record changes.
 
 use sightline_geometry::camera::Camera;
 use sightline_geometry::estimate::drift::Drift;
@@ -18,7 +18,7 @@ use sightline_world::target_truth::{StepTruth, TruthKind};
 use super::sheet::{Sheet, Value};
 use super::{arrays, extract_features, extract_shape, extract_template};
 
-/// Writes everything that one step computed; `folder` is the drive's folder, which sentences may name.
+/// Writes all results of one step; `folder` is the drive's folder, which messages may contain.
 pub(crate) fn step(sheet: &mut Sheet, trace: &RunStep, folder: &str) {
     sheet.within(&format!("stop{}", trace.step), |sheet| {
         let fault = trace.fault().map(|fault| fault.replace(folder, "DRIVE"));

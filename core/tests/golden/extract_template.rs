@@ -16,7 +16,7 @@ use sightline_vision::correlate::coarse_to_fine::CoarseSearch;
 
 use super::sheet::{Sheet, Value};
 
-/// Writes the evidence of the template tracker, which is that of point stereo alone at a designation.
+/// Writes the evidence of the template tracker; at a designation it has only point stereo.
 pub(crate) fn evidence(sheet: &mut Sheet, evidence: &TemplateEvidence) {
     sheet.each("warning", &evidence.warnings, warning);
     sheet.optional("warp", evidence.scale_roll.as_ref(), warp);

@@ -1,7 +1,7 @@
 //! A golden list in memory: names with typed values, and its text form.
 //!
 //! A line is `name -> kind tokens`. Kinds: `real` (one or more numbers, written so that they round trip exactly),
-//! `int`, `word` (text that must be equal), `digest` (SHA-256 in hexadecimal), and `absent`.
+//! `int`, `word` (text, compared exactly), `digest` (SHA-256 in hexadecimal), and `absent`.
 
 use std::collections::HashSet;
 use std::fmt::{Display, Write};
@@ -14,10 +14,10 @@ use sightline_geometry::frames::Pixel;
 /// Separates a name from its value.
 const ARROW: &str = " -> ";
 
-/// Evenly spaced samples of an array.
+/// Number of evenly spaced samples of an array.
 const SAMPLES: usize = 16;
 
-/// A value of a golden list, ready to be written after its name.
+/// The value of a line, formatted.
 pub(crate) struct Value(String);
 
 impl Value {
@@ -122,9 +122,9 @@ impl<T: Into<Self>> From<Option<T>> for Value {
 
 /// A number of an array.
 pub(crate) trait Number: Copy + Display {
-    /// The number with the precision of a mean.
+    /// The number as f64, for the mean.
     fn wide(self) -> f64;
-    /// Its bytes, least significant first.
+    /// Its bytes, little endian.
     fn bytes(self) -> Vec<u8>;
 }
 
@@ -142,7 +142,7 @@ macro_rules! number {
 }
 number!(f32, f64, u32);
 
-/// A golden list that is being written: lines in order, below a prefix.
+/// A golden list under construction: lines in order, below a prefix.
 #[derive(Default)]
 pub(crate) struct Sheet {
     prefix: String,
@@ -156,7 +156,7 @@ impl Sheet {
         self.lines.push((format!("{}{name}", self.prefix), text));
     }
 
-    /// Adds the lines that `write` writes, their names after `name` and a full stop.
+    /// Adds the lines that `write` adds, with `name` and a full stop before their names.
     pub(crate) fn within(&mut self, name: &str, write: impl FnOnce(&mut Self)) {
         let length = self.prefix.len();
         self.prefix.push_str(name);
@@ -165,7 +165,7 @@ impl Sheet {
         self.prefix.truncate(length);
     }
 
-    /// The same for a value that may be absent, which is one line then.
+    /// Like [`Self::within`], for a value that may be absent; an absent one is one line.
     pub(crate) fn optional<T>(&mut self, name: &str, value: Option<T>, write: impl FnOnce(&mut Self, T)) {
         match value {
             Some(value) => self.within(name, |sheet| write(sheet, value)),
@@ -173,7 +173,7 @@ impl Sheet {
         }
     }
 
-    /// The same for every element of a list, numbered from 0, after their count.
+    /// Like [`Self::within`], for every element of a list, numbered from 0; the first line is their number.
     pub(crate) fn each<T>(&mut self, name: &str, items: &[T], write: impl Fn(&mut Self, &T)) {
         self.within(name, |sheet| {
             sheet.put("count", items.len());
@@ -183,8 +183,8 @@ impl Sheet {
         });
     }
 
-    /// Adds the summary of an array: shape, extremes and mean of its finite values, count of the others, samples,
-    /// digest of its bytes.
+    /// Adds the summary of an array: shape, extremes and mean of its finite values, number of the others, samples, digest of
+    /// its bytes.
     pub(crate) fn array<N: Number>(&mut self, name: &str, shape: &[usize], values: &[N]) {
         let finite = || values.iter().copied().filter(|value| value.wide().is_finite());
         let by_size = |a: &N, b: &N| a.wide().total_cmp(&b.wide());
@@ -204,10 +204,10 @@ impl Sheet {
         });
     }
 
-    /// The finished list.
+    /// Returns the finished list.
     ///
     /// # Panics
-    /// Where two lines have one name.
+    /// If two lines have the same name.
     pub(crate) fn finish(self, cpu: &str) -> List {
         let mut names = HashSet::new();
         for (name, _) in &self.lines {

@@ -1,8 +1,7 @@
 //! The part of the crate `rerun` that recordings need: the SDK, its types and the encoding of files.
 //!
-//! The crate of that name also contains a catalogue client, a chunk store, a query engine and analytics, which no
-//! feature turns off. This crate exports the same paths from the crates below them, so that 43 crates fewer are
-//! compiled.
+//! The crate `rerun` also contains a catalogue client, a chunk store, a query engine and analytics, which no feature
+//! disables. This crate exports the same paths from the crates below it, which saves 43 crates.
 
 pub use re_sdk::*;
 pub use re_sdk_types::archetypes::*;

@@ -1,8 +1,8 @@
-//! `sightline drive`: drives the simulated rover towards a target on its own estimates, or follows a recording and compares its
-//! commands with what was recorded.
+//! `sightline drive`: drives the simulated rover towards a target on its own estimates, or follows a recording and compares
+//! its commands with the recorded motions.
 //!
-//! Each stop is one line of JSON on the standard output as soon as it is computed: the step's row and, under `cycle`, what was
-//! decided there. The last line is `{"summary": …}`.
+//! Writes one line of JSON per stop to the standard output as soon as it is computed: the step's row and, under `cycle`, the
+//! decisions at that stop. The last line is `{"summary": …}`.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -36,13 +36,13 @@ use super::study_odometry::Configuration;
 use super::terminal::{self, Progress};
 use super::track::{pixel, without_images};
 use super::{open, simulate};
-use crate::exports::rows::Row;
+use crate::exports::rows::ExportRow;
 
 /// Drive the simulated rover towards a target on its own estimates.
 #[derive(Debug, Args)]
 pub(super) struct Drive {
-    /// The scenario: a file, or a name that `sightline scenarios` lists. With the folder of a recording the rover goes where it
-    /// was recorded, and every line compares the command with the recorded step.
+    /// The scenario: a file, or a name from `sightline scenarios`. With the folder of a recording, the rover follows the
+    /// recorded path, and every line compares the command with the recorded step.
     scenario: PathBuf,
     /// The position of the target in the first left image, px; with several, the rover drives to one after the other.
     #[arg(long, value_name = "X,Y", value_parser = pixel, allow_hyphen_values = true,
@@ -76,10 +76,10 @@ pub(super) struct Drive {
     /// Maximum number of stops, including the first.
     #[arg(long, value_name = "N", default_value_t = DriveCommand::default().stops_max)]
     stops: u32,
-    /// What visual odometry is used for.
+    /// The use of visual odometry.
     #[arg(long, value_name = "USE", default_value = "full")]
     odometry: Odometry,
-    /// The pairs in which vision measures the motion.
+    /// The pairs used by visual odometry.
     #[arg(long, value_name = "PAIRS", default_value = "shared")]
     odometry_pair: Pairs,
     /// The settings of visual odometry.
@@ -88,7 +88,7 @@ pub(super) struct Drive {
     /// The navigator that chooses the motions.
     #[arg(long, value_name = "NAME", default_value = "arcs")]
     navigator: NavigatorName,
-    /// A pair of every stop that gives the hazard map, by its name in camera.further; may be given more than once. By default the
+    /// A pair of every stop for the hazard map, by its name in camera.further; can be given more than once. By default the
     /// first hazcams that look ahead.
     #[arg(long, value_name = "NAME")]
     hazard_camera: Vec<CameraName>,
@@ -98,7 +98,7 @@ pub(super) struct Drive {
     /// Slip ratio of a step above which the drive stops.
     #[arg(long, value_name = "PART", default_value_t = DriveCommand::default().slip_max)]
     slip_max: f64,
-    /// The motion that the slip is a part of.
+    /// The motion that the slip ratio refers to.
     #[arg(long, value_name = "MOTION", default_value = "wheels")]
     slip_check: SlipOf,
     /// Number of consecutive motions refused by visual odometry above which the drive stops; by default it never does.
@@ -107,11 +107,11 @@ pub(super) struct Drive {
     /// Time on Mars after which the drive stops, also during a motion, min.
     #[arg(long, value_name = "MIN", default_value_t = DriveCommand::default().flight_minutes_max)]
     minutes: f64,
-    /// Motions to drive one after the other instead of those to the goal: metres (0.5), `turn` and degrees (turn 20), or both
-    /// (0.5 turn 20), separated by commas.
+    /// Motions to drive in sequence instead of those to the goal: metres (0.5), `turn` and degrees (turn 20), or both (0.5
+    /// turn 20), separated by commas.
     #[arg(long, value_name = "MOTION,…", value_delimiter = ',', allow_hyphen_values = true)]
     motions: Vec<Motion>,
-    /// Whether the mast also looks at the targets that are visited afterwards.
+    /// Whether the mast also observes the targets that are visited later.
     #[arg(long, value_name = "true|false", default_value_t = true, action = clap::ArgAction::Set)]
     look_at_waiting: bool,
     /// An action after arrival; can be given more than once.
@@ -127,7 +127,7 @@ pub(super) struct Drive {
     /// Another seed than the scenario's.
     #[arg(long)]
     seed: Option<u64>,
-    /// A named configuration of the tracker, as `sightline presets` lists them; --set changes it further.
+    /// A named configuration of the tracker from `sightline presets`; --set changes it further.
     #[arg(long, value_name = "NAME")]
     preset: Option<String>,
     /// A setting of the tracker, for example ncc_min=0.6; can be given more than once.
@@ -136,71 +136,71 @@ pub(super) struct Drive {
     /// A setting of the scenario, for example terrain.slope_deg=5; can be given more than once.
     #[arg(long, value_name = "KEY=VALUE")]
     world: Vec<String>,
-    /// The folder to make for the drive, which can be opened and replayed; without it, the images are removed at the end.
+    /// The folder to create for the drive, which can be opened and replayed; without it, the images are removed at the end.
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
-    /// How the stops are written.
+    /// Output format of the stops.
     #[arg(long, default_value = "jsonl")]
     format: Format,
 }
 
-/// How the stops are written.
+/// Output format of the stops.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Format {
-    /// One JSON object a stop, then one with the summary.
+    /// One JSON object per stop, then one with the summary.
     Jsonl,
 }
 
-/// The line of a stop.
+/// The output line of a stop.
 #[derive(Serialize)]
 struct StopLine<'a> {
     /// The number of the target that the rover drives to, from 0; absent with one target.
     #[serde(skip_serializing_if = "Option::is_none")]
     target: Option<usize>,
     #[serde(flatten)]
-    row: Row,
-    /// Number of paths that are vetoed; absent without a hazard map.
+    row: ExportRow,
+    /// Number of vetoed paths; absent without a hazard map.
     #[serde(skip_serializing_if = "Option::is_none")]
     vetoed_paths: Option<usize>,
     cycle: &'a Cycle,
 }
 
-/// The line of a stop of a recording.
+/// The output line of a stop of a recording.
 #[derive(Serialize)]
 struct ReplayLine<'a> {
     #[serde(flatten)]
-    row: Row,
-    /// Number of paths that are vetoed; absent without a hazard map.
+    row: ExportRow,
+    /// Number of vetoed paths; absent without a hazard map.
     #[serde(skip_serializing_if = "Option::is_none")]
     vetoed_paths: Option<usize>,
     cycle: &'a Cycle,
     answer: Option<&'a Answer>,
 }
 
-/// The line after the last stop of a recording.
+/// The output line after the last stop of a recording.
 #[derive(Serialize)]
 struct ReplaySummaryLine {
     summary: ReplaySummary,
 }
 
-/// The line of a target.
+/// The output line of a target.
 #[derive(Serialize)]
 struct TargetLine {
     target: [f64; 2],
 }
 
-/// The line after the last stop.
+/// The output line after the last stop.
 #[derive(Serialize)]
 struct SummaryLine {
-    /// The visits of a drive to several targets.
+    /// The visits, in a drive to several targets.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     visits: Vec<Visit>,
-    /// The outcome, for the last target.
+    /// The outcome for the last target.
     summary: DriveSummary,
-    /// What the arm is told after a hand-off; absent without one.
+    /// Instrument-placement target after a hand-off; absent without one.
     #[serde(skip_serializing_if = "Option::is_none")]
     placement: Option<Placement>,
-    /// Why the drive stopped; absent where it has arrived.
+    /// Why the drive stopped; absent if it has arrived.
     #[serde(skip_serializing_if = "Option::is_none")]
     why: Option<StopExplanation>,
 }
@@ -209,7 +209,7 @@ impl Drive {
     /// Drives until the goal is reached or something ends the drive.
     ///
     /// # Errors
-    /// A scenario, target, command or setting that makes no sense, or a folder that cannot be written.
+    /// An invalid scenario, target, command or setting, or a folder that cannot be written.
     pub(super) fn run(self) -> Result<()> {
         if self.scenario.is_dir() {
             return self.replay();
@@ -337,7 +337,7 @@ impl Drive {
     }
 }
 
-/// Drives to the end, one line a stop.
+/// Drives to the end and writes one line per stop.
 fn follow(mut drive: TargetedDrive, settings: &Settings) -> Result<()> {
     let mut progress = Progress::new("drove to stop");
     let has_several = drive.has_several_targets();
@@ -356,7 +356,7 @@ fn follow(mut drive: TargetedDrive, settings: &Settings) -> Result<()> {
             let placement = drive.steps.last().and_then(|last| last.shape()?.placement);
             return line(&SummaryLine { visits: drive.visits, summary, placement, why });
         }
-        // The images of stops that were left behind are not needed any more.
+        // The images of earlier stops are not needed any more.
         drive.steps[number] = Arc::new(without_images(&drive.steps[number]));
     }
 }

@@ -25,32 +25,32 @@ impl OnArrival {
     }
 }
 
-/// What visual odometry is used for.
+/// The use of visual odometry.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(super) enum Odometry {
-    /// It does not run: the pose is that of wheels, gyro and accelerometers.
+    /// Visual odometry does not run; the pose comes from wheels, gyro and accelerometers.
     Off,
-    /// It measures the slip, which may end the drive; the pose is that of wheels, gyro and accelerometers.
+    /// Visual odometry measures the slip, which may end the drive; the pose comes from wheels, gyro and accelerometers.
     SlipCheck,
     /// Accepted updates correct the pose as well.
     Full,
 }
 
-/// The motion that the measured one is compared with.
+/// The motion that the measured motion is compared with.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(super) enum SlipOf {
-    /// What the wheels have driven.
+    /// The motion that the wheels have driven.
     Wheels,
-    /// The whole command, also where the time ended the motion early.
+    /// The whole command, even if a time limit ended the motion early.
     Command,
 }
 
-/// The pairs in which vision measures the motion.
+/// The pairs used by visual odometry.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(super) enum Pairs {
-    /// Those of the tracker; where an update is refused, also pairs that look back.
+    /// The pairs of the tracker; after a refused update, also pairs that look back.
     Shared,
-    /// Pairs of its own at every stop, ahead, and back once an update is refused.
+    /// Separate pairs at every stop, ahead, and back once an update is refused.
     Own,
 }
 

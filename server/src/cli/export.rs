@@ -1,7 +1,7 @@
-//! `sightline export`: the files that the server makes, by the very same code, without a browser.
+//! `sightline export`: writes the same files as the server, with the same code, without a browser.
 //!
-//! Either of a session in the data folder, also while a server works in it, or of targets on a traverse. Runs are computed
-//! again from what the session says of them: the same input gives the same bits.
+//! The source is a session in the data folder, even while a server uses it, or targets on a traverse. Runs are computed
+//! again from the saved session: the same input gives the same bits.
 
 use std::io::Write;
 use std::ops::ControlFlow;
@@ -25,8 +25,8 @@ use super::terminal::Progress;
 use super::track::pixel;
 use super::{open, terminal};
 use crate::access::Access;
-use crate::driven;
-use crate::exports::{Kind, Made, Part, Source, make};
+use crate::commanded_drive;
+use crate::exports::{ExportFormat, ExportedFile, SessionPart, Source, make};
 use crate::folders::Folders;
 use crate::hosts::Hosts;
 use crate::identity::{Identity, Relation};
@@ -36,15 +36,15 @@ use crate::problem::ApiError;
 use crate::state::AppState;
 use crate::store::{self, Store};
 
-/// How often a run that is being computed is looked at.
-const GLANCE: Duration = Duration::from_millis(50);
+/// Polling interval while a run is computed.
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Write a session as a file: a recording, tables, pictures, a report, or what is needed to do the same again.
+/// Write a session as a file: a recording, tables, images, a report, or the input needed to reproduce it.
 #[derive(Debug, Args)]
 pub(super) struct Export {
     /// The file: recording.rrd, rows.csv, rows.jsonl, rows.parquet, steps.apng, steps.png, report.html or reproduce.json.
     #[arg(value_parser = kind)]
-    kind: Kind,
+    kind: ExportFormat,
     /// The traverse: a folder, an index or a scenario; not needed for a session on a simulated traverse of the data folder.
     traverse: Option<PathBuf>,
     /// A session of the data folder.
@@ -55,7 +55,7 @@ pub(super) struct Export {
     data_dir: Option<PathBuf>,
     /// One target of the session, or one of its runs, by numbers from 0: 0 or 0/1.
     #[arg(long, value_name = "TARGET[/RUN]", value_parser = part)]
-    run: Option<Part>,
+    run: Option<SessionPart>,
     /// A target by its position in the left image, px, instead of a session; can be given more than once.
     #[arg(long, value_name = "X,Y", value_parser = pixel, allow_hyphen_values = true, requires = "traverse")]
     target: Vec<Pixel>,
@@ -71,13 +71,13 @@ pub(super) struct Export {
     /// A setting of the tracker for such targets, for example ncc_min=0.6; can be given more than once.
     #[arg(long, value_name = "KEY=VALUE", requires = "target")]
     set: Vec<String>,
-    /// The file to write, a new one; by default a name that says what it is, in the present folder.
+    /// The file to write, which must not exist; by default a descriptive name in the current folder.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
 
 impl Export {
-    /// Makes the file.
+    /// Creates the file.
     ///
     /// # Errors
     /// A session, traverse, target or setting that does not exist, or a file that cannot be written.
@@ -85,7 +85,7 @@ impl Export {
         if let Some(out) = self.out.as_ref().filter(|out| out.exists()) {
             return Err(Error::format(out, "exists already; choose another name"));
         }
-        // What the server keeps is not touched: the session is worked on in a folder of its own.
+        // Works on a copy of the session in a temporary folder, so that the server's data is untouched.
         let folder =
             tempfile::tempdir().map_err(|error| Error::Request(format!("cannot make a folder: {error}")))?;
         let live = match &self.session {
@@ -95,7 +95,7 @@ impl Export {
         let source = Source::of(&live);
         let part = self.run.unwrap_or_default();
         source.check(self.kind, part).map_err(refused)?;
-        let part = source.narrowed(self.kind, part);
+        let part = source.resolve_part(self.kind, part);
         let out = self.out.unwrap_or_else(|| PathBuf::from(source.file_name(self.kind, part)));
         let mut progress = Progress::new("wrote stop");
         let mut tell = |k, n| {
@@ -107,7 +107,7 @@ impl Export {
         terminal::line(&out.display().to_string())
     }
 
-    /// A session of the data folder, computed again.
+    /// A session of the data folder, recomputed.
     fn session(&self, id: &str, folder: &Path) -> Result<Arc<LiveSession>> {
         let data = open::data_folder(self.data_dir.as_deref())?;
         let sessions = data.join("sessions");
@@ -120,10 +120,10 @@ impl Export {
         let saved = found.sessions.iter().find(|saved| saved.id == id).ok_or_else(missing)?;
         let of_commands = data.join("driven").join(&saved.traverse);
         let (traverses, saved) = if of_commands.is_dir() {
-            let copied = Folders::in_one(folder).driven.join(&saved.traverse);
-            driven::copy(&of_commands, &copied)?;
+            let copied = Folders::in_one(folder).commanded_drives.join(&saved.traverse);
+            commanded_drive::copy(&of_commands, &copied)?;
             let last_stop = Traverse::open(&copied)?.stop_count() - 1;
-            // The rover of the copy stays where it is.
+            // The rover of the copy does not drive on.
             let steering = saved.steering.as_ref().map(|steering| steering.staying(last_stop));
             (Vec::new(), SavedSession { steering, ..saved.clone() })
         } else {
@@ -138,7 +138,7 @@ impl Export {
         computed(traverses, folder, id)
     }
 
-    /// The traverse of a session, which must be the one that it was made on.
+    /// The traverse of a session, which must be the one on which the session was created.
     fn traverse_of(&self, id: &str, theirs: &str, data: &Path) -> Result<Traverse> {
         let traverse = match &self.traverse {
             Some(path) => open::open(path, Some(data))?,
@@ -158,7 +158,7 @@ impl Export {
         }
     }
 
-    /// Targets on a traverse, as a session that nobody keeps.
+    /// Targets on a traverse, as a temporary session.
     fn targets(&self, folder: &Path) -> Result<Arc<LiveSession>> {
         let path = self.traverse.as_ref().ok_or_else(|| Error::Request("name a traverse".to_owned()))?;
         let changes = self.set.iter().map(|text| parse_assignment(text)).collect::<Result<Changes>>()?;
@@ -185,7 +185,7 @@ impl Export {
     }
 }
 
-/// The session of that name in `folder` with all its runs, which are computed by what computes them in the server.
+/// The session `id` in `folder` with all its runs, computed by the server's code.
 fn computed(traverses: Vec<Traverse>, folder: &Path, id: &str) -> Result<Arc<LiveSession>> {
     let runtime = super::runtime()?;
     let _inside = runtime.enter();
@@ -205,20 +205,20 @@ fn computed(traverses: Vec<Traverse>, folder: &Path, id: &str) -> Result<Arc<Liv
         if k < n {
             progress.tell(k, n);
         }
-        std::thread::sleep(GLANCE);
+        std::thread::sleep(POLL_INTERVAL);
     }
     let (k, n) = live.with(|session| count(session));
     if k == n && n > 0 {
         progress.tell(k, n);
     }
-    // What stopped a run by itself is no reason to export nothing, but it has to be said.
+    // A run that stopped early does not prevent the export, but is reported.
     for (target, run, why) in live.with(|session| stopped(session)) {
         terminal::error(&format!("run {run} of target {target} stopped before the last stop: {why}"));
     }
     Ok(live)
 }
 
-/// The runs that did not come to the last stop, and why.
+/// The runs that stopped before the last stop: target, run, reason.
 fn stopped(session: &Session) -> Vec<(usize, usize, String)> {
     let targets = session.targets.iter().enumerate().filter(|(_, target)| !target.removed);
     let of_target = targets.flat_map(|(number, target)| {
@@ -227,7 +227,7 @@ fn stopped(session: &Session) -> Vec<(usize, usize, String)> {
     of_target.filter_map(|(target, run, why)| why.map(|why| (target, run, why))).collect()
 }
 
-/// The traverse of that name among the simulated ones of the data folder.
+/// The simulated traverse named `id` in the data folder.
 fn find_traverse(data: &Path, id: &str) -> Result<Traverse> {
     let entries = std::fs::read_dir(data.join("traverses")).into_iter().flatten().flatten();
     let opened = entries.filter_map(|entry| Traverse::open(&entry.path()).ok());
@@ -239,34 +239,34 @@ fn find_traverse(data: &Path, id: &str) -> Result<Traverse> {
     })
 }
 
-/// Writes the file complete or not at all.
-fn write(path: &Path, made: Made) -> Result<()> {
+/// Writes the complete file or none.
+fn write(path: &Path, made: ExportedFile) -> Result<()> {
     let mut file = terminal::new_file(path)?;
     match made {
-        Made::Bytes(bytes) => file.write_all(&bytes),
-        Made::File(mut source, _folder) => std::io::copy(&mut source, &mut file).map(|_| ()),
+        ExportedFile::Bytes(bytes) => file.write_all(&bytes),
+        ExportedFile::File(mut source, _folder) => std::io::copy(&mut source, &mut file).map(|_| ()),
     }
     .map_err(|source| Error::Write { path: path.to_owned(), source })?;
     file.complete_new()
 }
 
-/// A problem as the command line says it.
+/// Converts a problem of the server to an error of the command line.
 #[allow(clippy::needless_pass_by_value)]
 fn refused(problem: ApiError) -> Error {
-    let said = problem.problem();
-    let hint = said.hint.as_ref().map_or_else(String::new, |hint| format!(" {hint}"));
-    Error::Request(format!("{}{hint}", said.detail))
+    let details = problem.problem();
+    let hint = details.hint.as_ref().map_or_else(String::new, |hint| format!(" {hint}"));
+    Error::Request(format!("{}{hint}", details.detail))
 }
 
-fn kind(text: &str) -> Result<Kind, String> {
-    let names = || Kind::ALL.map(Kind::name).join(", ");
-    Kind::from_name(text).ok_or_else(|| format!("is none of {}", names()))
+fn kind(text: &str) -> Result<ExportFormat, String> {
+    let names = || ExportFormat::ALL.map(ExportFormat::name).join(", ");
+    ExportFormat::from_name(text).ok_or_else(|| format!("is none of {}", names()))
 }
 
-fn part(text: &str) -> Result<Part, String> {
+fn part(text: &str) -> Result<SessionPart, String> {
     let number = |text: &str| text.parse::<usize>().map_err(|_| "write it as 0 or 0/1".to_owned());
     match text.split_once('/') {
-        Some((target, run)) => Ok(Part { target: Some(number(target)?), run: Some(number(run)?) }),
-        None => Ok(Part { target: Some(number(text)?), run: None }),
+        Some((target, run)) => Ok(SessionPart { target: Some(number(target)?), run: Some(number(run)?) }),
+        None => Ok(SessionPart { target: Some(number(text)?), run: None }),
     }
 }

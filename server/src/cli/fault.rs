@@ -3,10 +3,10 @@
 use sightline_session::faults::NewFault;
 use sightline_world::scenario::FaultKind;
 
-/// Reads a fault.
+/// Parses a fault.
 ///
 /// # Errors
-/// A sentence that says what is expected.
+/// A sentence that describes the expected form.
 pub(super) fn parse(text: &str) -> Result<NewFault, String> {
     let expected = || format!("{text} is not KIND:FROM-TO[@TARGET], for example occluder:5-7");
     let (kind, rest) = text.split_once(':').ok_or_else(expected)?;

@@ -1,4 +1,4 @@
-//! `sightline import`: turns a foreign recording into a traverse.
+//! `sightline import`: converts a foreign recording to a traverse.
 
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
@@ -10,12 +10,12 @@ use sightline_recordings::import::{ImportOptions, import, recognise};
 
 use super::terminal::{self, Progress};
 
-/// Turn a foreign recording into a traverse.
+/// Convert a foreign recording to a traverse.
 #[derive(Debug, Args)]
 pub(super) struct Import {
     /// The recording: a folder or a file.
     path: PathBuf,
-    /// The folder to make.
+    /// The folder to create.
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
     /// The format; by default it is recognised.
@@ -24,7 +24,7 @@ pub(super) struct Import {
     /// The name of the traverse; by default that of the recording.
     #[arg(long)]
     name: Option<String>,
-    /// A left file of a stop, relative to the recording; can be given more than once, each with its --right.
+    /// A left file of a stop, relative to the recording; can be given more than once, each with its own --right.
     #[arg(long, value_name = "FILE")]
     left: Vec<PathBuf>,
     /// The right file of the stop of the same --left.
@@ -63,10 +63,10 @@ enum Format {
 }
 
 impl Import {
-    /// Imports, telling progress.
+    /// Imports the recording and reports progress.
     ///
     /// # Errors
-    /// As [`import`], and another format than the one asked for.
+    /// As [`import`], and when the recording has another format than the requested one.
     pub(super) fn run(self) -> Result<()> {
         if let Some(format) = self.format {
             check_format(format, recognise(&self.path)?.name(), &self.path)?;

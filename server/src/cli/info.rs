@@ -1,4 +1,4 @@
-//! `sightline info`: what a traverse holds, in words.
+//! `sightline info`: prints a summary of a traverse.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -28,7 +28,7 @@ impl Info {
     /// A traverse that cannot be opened.
     pub(super) fn run(self) -> Result<()> {
         let traverse = open::open(&self.traverse, None)?;
-        // Names come from the file, and a terminal obeys control characters.
+        // Names come from the file and could contain control characters.
         summary(&traverse).iter().try_for_each(|line| terminal::line(&printable(line)))
     }
 }
@@ -89,8 +89,8 @@ fn further(traverse: &Traverse) -> Vec<String> {
     for camera in (0..count).flat_map(|step| traverse.further_cameras(step)) {
         let [width, height] = camera.left.size;
         let kind = if camera.right.is_some() { "pair" } else { "single camera" };
-        let place = if camera.mast_angles.is_some() { "on the mast" } else { "on the body" };
-        let words = format!("{kind} of {width} × {height} px {place}");
+        let mount = if camera.mast_angles.is_some() { "on the mast" } else { "on the body" };
+        let words = format!("{kind} of {width} × {height} px {mount}");
         found.entry(camera.name).or_insert((0, words)).0 += 1;
     }
     let line = |(name, (stops, words)): (CameraName, (usize, String))| {

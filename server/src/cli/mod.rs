@@ -1,7 +1,7 @@
 //! The command line: one file for each command.
 //!
-//! Results go to the standard output, progress and complaints to the standard error. Exit codes: 0 done,
-//! 2 the command was not written correctly, 3 bad input, said in one sentence.
+//! Results go to the standard output, progress and errors to the standard error. Exit codes: 0 success, 2 invalid command
+//! line, 3 bad input, explained in one sentence.
 
 mod serve;
 mod scenarios;
@@ -49,7 +49,7 @@ enum Command {
     Scenarios(scenarios::Scenarios),
     /// Render a simulated traverse into a folder.
     Simulate(simulate::Simulate),
-    /// Turn a foreign recording (KITTI odometry, PDS3) into a traverse.
+    /// Convert a foreign recording (KITTI odometry, PDS3) to a traverse.
     Import(import::Import),
     /// Print the contents of a traverse.
     Info(info::Info),
@@ -61,7 +61,7 @@ enum Command {
     Drive(drive::Drive),
     /// Run a validation experiment: many targets in many worlds against the truth.
     Study(study::Study),
-    /// Write a session as a file: a recording, tables, pictures, a report.
+    /// Write a session as a file: a recording, tables, images, a report.
     Export(export::Export),
 }
 
@@ -84,11 +84,11 @@ pub fn run() -> ExitCode {
     exit_code(outcome)
 }
 
-/// The exit code of a command; what went wrong is written to the standard error.
+/// The exit code of a command; writes the error to the standard error.
 pub fn exit_code(outcome: Result<()>) -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
-        // Whoever reads our output has had enough, as `head` does.
+        // The reader closed the pipe, as `head` does.
         Err(Error::Write { path, source })
             if path.as_os_str() == terminal::STDOUT && source.kind() == std::io::ErrorKind::BrokenPipe =>
         {
@@ -101,19 +101,19 @@ pub fn exit_code(outcome: Result<()>) -> ExitCode {
     }
 }
 
-/// Logs warnings of our own and errors of others to the standard error; `RUST_LOG` says otherwise.
+/// Logs our warnings and the errors of other crates to the standard error, unless `RUST_LOG` is set.
 pub fn start_log() {
     use tracing_subscriber::EnvFilter;
     let filter =
         EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("error,sightline_server=warn"));
-    // Another log may have been started by a library; then that one stays.
+    // A log that a library has already started stays in use.
     let colours = std::io::stderr().is_terminal();
     let log =
         tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).with_ansi(colours);
     let _ = log.try_init();
 }
 
-/// What jobs and requests run on.
+/// The runtime of jobs and requests.
 fn runtime() -> Result<tokio::runtime::Runtime> {
     let built = tokio::runtime::Builder::new_multi_thread().enable_all().build();
     built.map_err(|error| Error::Request(format!("cannot start: {error}")))

@@ -1,5 +1,5 @@
-//! Opening what a command was given: a folder, an index, or a scenario (a file, or a name of the library), from
-//! which a folder is made first.
+//! Opens the traverse argument of a command: a folder, an index, or a scenario (a file, or a name of the library), for which
+//! a folder is created first.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -12,16 +12,16 @@ use sightline_world::{Scenario, library};
 use super::terminal::{self, Progress};
 use crate::drives;
 
-/// The folder of simulated traverses in the data folder.
+/// The subfolder of the data folder with simulated traverses.
 pub(super) const TRAVERSES: &str = "traverses";
 
-/// The largest scenario that is read, bytes.
+/// Maximum size of a scenario file, bytes.
 const SCENARIO_LIMIT: u64 = 1 << 20;
 
-/// The folder in which the program keeps what it makes.
+/// The data folder of the program.
 ///
 /// # Errors
-/// When neither the command nor the environment names one.
+/// When neither the command line nor the environment specifies one.
 pub(super) fn data_folder(given: Option<&Path>) -> Result<PathBuf> {
     let from = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
     let found = given
@@ -32,7 +32,7 @@ pub(super) fn data_folder(given: Option<&Path>) -> Result<PathBuf> {
     found.ok_or_else(|| Error::Request("there is no home folder; choose a folder with --data-dir".to_owned()))
 }
 
-/// Opens a traverse by its folder or index, or makes one from a scenario in the data folder.
+/// Opens a traverse by its folder or index, or creates one from a scenario in the data folder.
 ///
 /// # Errors
 /// As [`Traverse::open`] and [`create_simulated`].
@@ -46,7 +46,7 @@ pub fn open(path: &Path, data: Option<&Path>) -> Result<Traverse> {
     }
 }
 
-/// The error that says how a foreign recording is opened, where `path` is one.
+/// The error that explains how to open a foreign recording, if `path` is one.
 fn foreign(path: &Path) -> Option<Error> {
     let format = recognise(path).ok()?.name();
     let shown = path.display();
@@ -57,7 +57,7 @@ fn foreign(path: &Path) -> Option<Error> {
     Some(Error::format(path, problem))
 }
 
-/// The traverse of a scenario: the same scenario always has the same folder, so that images are rendered once.
+/// The traverse of a scenario. The folder depends only on the scenario, so that images are rendered once.
 ///
 /// # Errors
 /// As [`create_simulated`].
@@ -69,12 +69,12 @@ pub(super) fn simulated(scenario: &Scenario, data: &Path) -> Result<Traverse> {
     create_simulated(scenario, &folder)
 }
 
-/// The scenario in a file, or the one of the library that goes by this name.
+/// The scenario in a file, or the library scenario of this name.
 ///
 /// # Errors
-/// A file that cannot be read or is no scenario, or a name that is neither a file nor in the library.
+/// A file that cannot be read or is not a scenario, or a name that is neither a file nor in the library.
 pub fn scenario(path: &Path) -> Result<Scenario> {
-    // A folder of that name is no scenario: a study keeps its worlds in one.
+    // A folder of that name is not a scenario: a study stores its worlds in one.
     if let Some(name) = library_name(path).filter(|_| !path.is_file()) {
         return library::scenario(name);
     }
@@ -84,13 +84,13 @@ pub fn scenario(path: &Path) -> Result<Scenario> {
     Scenario::from_toml(&read(path)?, path)
 }
 
-/// The library's scenario that a bare word names.
+/// The name of the library scenario that `path` is, if any.
 fn library_name(path: &Path) -> Option<&'static str> {
     library::names().find(|name| path == Path::new(name))
 }
 
-/// Renders what is missing of a simulated traverse, its further cameras included, telling progress; recorded ones need
-/// nothing.
+/// Renders the missing images of a simulated traverse, including its further cameras, and reports progress; does nothing for
+/// a recorded traverse.
 ///
 /// # Errors
 /// As [`Traverse::render_camera`].
@@ -112,7 +112,7 @@ pub fn render(traverse: &Traverse) -> Result<()> {
     Ok(())
 }
 
-/// The scenario in `path`, where that is a file of one; an index always has stops, a scenario never.
+/// The scenario in `path`, if the file is one: an index always has stops, a scenario never.
 fn read_scenario_or_index(path: &Path) -> Result<Option<Scenario>> {
     if path.is_dir() || path.extension().is_none_or(|ending| ending != "toml") {
         return Ok(None);

@@ -1,4 +1,4 @@
-//! `sightline presets`: the named configurations of the tracker, with what each changes.
+//! `sightline presets`: the named configurations of the tracker and the settings that each changes.
 
 use clap::{Args, ValueEnum};
 use sightline_geometry::error::{Error, Result};
@@ -9,27 +9,27 @@ use super::terminal;
 /// List the named configurations of the tracker, or print one.
 #[derive(Debug, Args)]
 pub(super) struct Presets {
-    /// The configuration to print as TOML; without it all are listed.
+    /// The configuration to print as TOML; without it, all are listed.
     name: Option<String>,
-    /// How they are written.
+    /// Output format.
     #[arg(long, default_value = "text")]
     format: Format,
 }
 
-/// How presets are written.
+/// Output format of presets.
 #[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
 enum Format {
-    /// One line each: the name and what it does.
+    /// One line each: the name and the description.
     Text,
-    /// One TOML table each, with the settings that it changes.
+    /// One TOML table each, with the changed settings.
     Toml,
 }
 
 impl Presets {
-    /// Lists them, or prints one.
+    /// Lists the presets, or prints one.
     ///
     /// # Errors
-    /// A name that is not listed.
+    /// A name that does not exist.
     pub(super) fn run(self) -> Result<()> {
         if let Some(name) = &self.name {
             return terminal::line(table(preset(name)?)?.trim_end());
@@ -45,7 +45,7 @@ impl Presets {
     }
 }
 
-/// A preset as a TOML table: what it does, and the settings that it changes.
+/// A preset as a TOML table: its description and the changed settings.
 fn table(preset: &Preset) -> Result<String> {
     let changes = preset.settings()?.changes();
     let text = toml::to_string(&changes).map_err(|error| Error::Request(error.to_string()))?;

@@ -1,4 +1,4 @@
-//! `sightline scenarios`: the scenarios that come with the program.
+//! `sightline scenarios`: the scenarios of the built-in library.
 
 use clap::Args;
 use sightline_geometry::error::Result;
@@ -9,15 +9,15 @@ use super::terminal;
 /// List the scenarios that come with the program, or print one.
 #[derive(Debug, Args)]
 pub(super) struct Scenarios {
-    /// The scenario to print as TOML, a start for one of your own.
+    /// The scenario to print as TOML, as a template for your own.
     name: Option<String>,
 }
 
 impl Scenarios {
-    /// Lists the library, or prints one scenario of it.
+    /// Lists the library, or prints one scenario.
     ///
     /// # Errors
-    /// A name that the library does not have.
+    /// A name that is not in the library.
     pub(super) fn run(self) -> Result<()> {
         if let Some(name) = self.name {
             library::scenario(&name)?;

@@ -1,4 +1,4 @@
-//! `sightline serve`: the page, the interface and the sessions of one or more traverses.
+//! `sightline serve`: serves the page, the REST interface and the sessions of one or more traverses.
 
 use std::fs::{File, TryLockError};
 use std::net::{IpAddr, SocketAddr, TcpListener};
@@ -21,10 +21,10 @@ use crate::memory;
 use crate::public_url::PublicUrl;
 use crate::state::AppState;
 
-/// How long the end of the program waits for work that does not look at a cancel flag.
+/// How long shutdown waits for work that does not check a cancel flag.
 const SHUTDOWN: Duration = Duration::from_secs(1);
 
-/// The variable with the access token, which other users of the machine cannot see as they see arguments.
+/// The environment variable with the access token: unlike arguments, other users of the machine cannot read it.
 const TOKEN_VARIABLE: &str = "SIGHTLINE_TOKEN";
 
 /// Open traverses in the browser.
@@ -35,10 +35,10 @@ pub(super) struct Serve {
     /// A folder below which pages may open recordings (KITTI, PDS3, drives); can be given more than once.
     #[arg(long, value_name = "FOLDER")]
     recordings: Vec<PathBuf>,
-    /// The port; 0 for any free one.
+    /// The port; 0 for any free port.
     #[arg(long, default_value_t = 7700)]
     port: u16,
-    /// The address to listen on; another one than this machine's own also needs --allow-host.
+    /// The address to listen on; an address other than loopback also needs --allow-host or --behind-proxy.
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
     listen: IpAddr,
     /// A further name under which the server may be addressed; can be given more than once.
@@ -50,22 +50,22 @@ pub(super) struct Serve {
     /// The access token, 16 letters or more, instead of a random one; also the variable SIGHTLINE_TOKEN.
     #[arg(long, value_name = "TOKEN", value_parser = Token::chosen)]
     token: Option<Token>,
-    /// Let in everybody who reaches the server: every user of this machine.
+    /// Allow access without a token, for every user of this machine and every client that reaches the server.
     #[arg(long, conflicts_with = "token")]
     no_token: bool,
     /// Where sessions and simulated traverses are kept.
     #[arg(long, value_name = "FOLDER")]
     data_dir: Option<PathBuf>,
-    /// Moves a limit of the server; can be given more than once. `--limit help` lists all of them.
+    /// Set a limit of the server; can be given more than once. `--limit help` lists all of them.
     #[arg(long, value_name = "NAME=VALUE")]
     limit: Vec<String>,
 }
 
 impl Serve {
-    /// Serves until the program is ended.
+    /// Serves until the program is stopped.
     ///
     /// # Errors
-    /// A traverse that cannot be opened, a data folder in use, or a port that is taken.
+    /// A traverse that cannot be opened, a data folder in use, or a port in use.
     pub(super) fn run(self) -> Result<()> {
         let mut limits = Limits::default();
         if self.limit.iter().any(|text| text == "help") {
@@ -111,12 +111,12 @@ impl Serve {
         let page = self.behind_proxy.as_ref().map_or_else(|| page(address), PublicUrl::to_string);
         let ended = runtime.block_on(serve(listener, &with_token(&page, token.as_ref()), state));
         drop(inside);
-        // Work that is under way is lost in any case: nothing of it is on disk before it ends.
+        // Unfinished work is lost in any case: none of it is on disk before it is complete.
         runtime.shutdown_timeout(SHUTDOWN);
         ended
     }
 
-    /// The access token; none with `--no-token`.
+    /// The access token; `None` with `--no-token`.
     fn token(&self) -> Result<Option<Token>> {
         if self.no_token {
             return Ok(None);
@@ -143,16 +143,16 @@ async fn serve(listener: TcpListener, url: &str, state: AppState) -> Result<()> 
     terminal::line(&format!("Sightline is ready: {url}"))?;
     let ended = tokio::select! {
         never = connections::serve(listener, app, state.limits(), connections) => match never {},
-        never = memory::give_back() => match never {},
-        () = told_to_end() => Ok(()),
+        never = memory::return_freed_memory() => match never {},
+        () = shutdown_signal() => Ok(()),
     };
-    // Everything but a cursor that has just moved is on disk already.
+    // Only a cursor that moved very recently is not on disk yet.
     state.store().flush()?;
     ended
 }
 
-/// Waits until a person or the system asks the program to end.
-async fn told_to_end() {
+/// Waits for Ctrl-C or a termination signal.
+async fn shutdown_signal() {
     #[cfg(unix)]
     {
         use tokio::signal::unix::{SignalKind, signal};
@@ -167,11 +167,11 @@ async fn told_to_end() {
             return;
         }
     }
-    // Without a way to hear of it the program ends at once, as any other does.
+    // If the handlers cannot be installed, the signals end the program at once, which is the default.
     let _ = tokio::signal::ctrl_c().await;
 }
 
-/// Takes the port before anything long begins.
+/// Binds the port before any long work begins.
 fn bind(address: SocketAddr) -> Result<TcpListener> {
     let listener = TcpListener::bind(address).map_err(|error| match error.kind() {
         std::io::ErrorKind::AddrInUse => {
@@ -186,7 +186,7 @@ fn bind(address: SocketAddr) -> Result<TcpListener> {
     Ok(listener)
 }
 
-/// The address of the page as a browser takes it.
+/// The address of the page for a browser.
 fn page(address: SocketAddr) -> String {
     if address.ip().is_unspecified() {
         format!("http://127.0.0.1:{}/", address.port())
@@ -195,13 +195,13 @@ fn page(address: SocketAddr) -> String {
     }
 }
 
-/// The address with the token in its fragment, which a browser sends to nobody.
+/// The address with the token in its fragment, which a browser never sends.
 fn with_token(page: &str, token: Option<&Token>) -> String {
     let fragment = token.map(|token| format!("#token={}", token.secret())).unwrap_or_default();
     format!("{page}{fragment}")
 }
 
-/// Two servers must not write the same sessions; the system lets go of the lock when the program ends.
+/// Locks the data folder against a second server; the system releases the lock when the program ends.
 fn lock(data: &Path) -> Result<File> {
     let path = data.join("lock");
     let unwritable = |source| Error::Write { path: path.clone(), source };

@@ -1,7 +1,7 @@
-//! The contact sheet of a traverse: its left images, reduced, row by row, so that a drive is seen at a glance.
+//! The contact sheet of a traverse: its left images, reduced, row by row, for an overview of the drive.
 //!
-//! At most eight stops, evenly spaced, the first and the last among them. Levels are drawn as their square root,
-//! near what a screen shows for linear light, with one scale for the whole sheet.
+//! Contains at most eight evenly spaced stops, including the first and the last. Levels are drawn as their square root,
+//! close to the display gamma for linear light, with one scale for the whole sheet.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -12,16 +12,16 @@ use sightline_geometry::error::{Error, Result};
 use sightline_recordings::Traverse;
 use sightline_recordings::files::{remove_left_overs_of, write_atomically};
 
-/// Images in a row.
+/// Images per row.
 const COLUMNS: u32 = 4;
-/// Most images on a sheet.
+/// Maximum number of images on a sheet.
 const MOST: usize = 8;
 /// Width of an image on the sheet, px.
 const WIDTH_PX: u32 = 160;
 /// Space between images, px.
 const GAP_PX: u32 = 4;
 
-/// Writes the contact sheet of a traverse whose images are there.
+/// Writes the contact sheet of a traverse whose images exist.
 ///
 /// # Errors
 /// An image that cannot be read, or a file that cannot be written.
@@ -59,7 +59,7 @@ pub(super) fn write(traverse: &Traverse, path: &Path) -> Result<()> {
     write_atomically(path, bytes.get_ref())
 }
 
-/// The stops on the sheet.
+/// The stops shown on the sheet.
 fn evenly_spaced(stops: usize) -> Vec<usize> {
     let count = stops.min(MOST);
     (0..count).map(|k| if count > 1 { k * (stops - 1) / (count - 1) } else { 0 }).collect()

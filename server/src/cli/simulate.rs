@@ -14,10 +14,10 @@ use super::{open, sheet};
 /// Render a simulated traverse into a folder.
 #[derive(Debug, Args)]
 pub(super) struct Simulate {
-    /// The scenario: a file, or a name that `sightline scenarios` lists; by default that of the demonstration.
+    /// The scenario: a file, or a name from `sightline scenarios`; by default the demonstration.
     #[arg(value_name = "SCENARIO")]
     scenario: Option<PathBuf>,
-    /// The folder to make.
+    /// The folder to create.
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
     /// Another seed than the scenario's.
@@ -29,17 +29,17 @@ pub(super) struct Simulate {
     /// Also write a contact sheet of the drive, a PNG.
     #[arg(long, value_name = "FILE")]
     sheet: Option<PathBuf>,
-    /// Also write the truth of every picture: ranges, surfaces, normals and shadows as .npy files in the folder
+    /// Also write the ground truth of every image: ranges, surfaces, normals and shadows as .npy files in the folder
     /// `truth`, 42 MiB a stop of 1024 × 1024 px.
     #[arg(long)]
     truth: bool,
 }
 
 impl Simulate {
-    /// Makes the folder and renders every stop.
+    /// Creates the folder and renders every stop.
     ///
     /// # Errors
-    /// A bad scenario or setting, or a folder that cannot be written or holds another traverse.
+    /// A bad scenario or setting, or a folder that cannot be written or contains another traverse.
     pub(super) fn run(self) -> Result<()> {
         let mut scenario = self.scenario.as_deref().map_or_else(|| Ok(Scenario::demo()), open::scenario)?;
         scenario.seed = self.seed.unwrap_or(scenario.seed);
@@ -57,7 +57,7 @@ impl Simulate {
     }
 }
 
-/// Writes the truth of every stop, telling progress.
+/// Writes the ground truth of every stop and reports progress.
 fn write_truth(traverse: &Traverse) -> Result<()> {
     let stops = traverse.stop_count();
     let mut progress = Progress::new("wrote the truth of stop");
@@ -69,7 +69,7 @@ fn write_truth(traverse: &Traverse) -> Result<()> {
     Ok(())
 }
 
-/// The scenario with settings changed by name; errors name the `option` that changes them.
+/// The scenario with settings changed by name; errors mention `option`.
 pub(super) fn with(scenario: &Scenario, option: &str, changes: &[String]) -> Result<Scenario> {
     let mut document: toml::Table =
         toml::from_str(&scenario.to_toml()).map_err(|error| Error::Request(error.to_string()))?;
@@ -82,10 +82,9 @@ pub(super) fn with(scenario: &Scenario, option: &str, changes: &[String]) -> Res
     Scenario::from_toml(&document.to_string(), Path::new(option))
 }
 
-/// Gives a setting a value; a whole number may stand for one with a fraction.
+/// Sets a value; an integer is accepted for a fraction.
 ///
-/// A setting that a scenario may leave out is not in its document: whether there is one of that name is seen by reading
-/// the document again.
+/// Optional settings that are absent from the document are checked by parsing the changed document.
 fn set(document: &mut toml::Table, key: &str, value: &str) -> Result<()> {
     let unknown = || Error::setting(key, "the scenario has no such setting");
     let (sections, name) =
@@ -126,14 +125,14 @@ mod tests {
         let changed = with(&Scenario::demo(), "--set", &changes).unwrap();
         assert_eq!((changed.sun.elevation_deg, changed.name.as_str()), (20.0, "two words"));
         assert_eq!(changed.rocks, Scenario::demo().rocks);
-        // The demonstration hands nothing over, so that its document does not name the setting.
+        // The demonstration has no hand-off, so its document does not contain the setting.
         let handed_over =
             with(&Scenario::demo(), "--set", &["camera.hand_over=mer_front_hazcam".to_owned()]).unwrap();
         assert_eq!(handed_over.camera.hand_over, Some(CameraRig::MerFrontHazcam));
     }
 
     #[test]
-    fn what_no_scenario_has_is_refused_by_name() {
+    fn unknown_scenario_settings_are_rejected_by_name() {
         for (change, named) in
             [("sun.height=3", "sun.height"), ("sun=3", "sun"), ("a.b=1", "a.b"), ("seed", "key=value")]
         {

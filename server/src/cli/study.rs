@@ -1,4 +1,4 @@
-//! `sightline study`: the validation experiments, from a grid of worlds to a table and a report.
+//! `sightline study`: validation experiments, from a grid of worlds to a table and a report.
 
 use std::path::PathBuf;
 use std::sync::Mutex;
@@ -30,7 +30,7 @@ pub(super) struct Study {
 
 #[derive(Debug, Subcommand)]
 enum Experiment {
-    /// Straight approaches in steps of 5 to 23 %, by skipping pictures (the paper's Figure 8).
+    /// Straight approaches in steps of 5 to 23 %, by skipping images (the paper's Figure 8).
     Straight(Experimental),
     /// Crab motion around a target in steps of 5 to 60°, two search windows (the paper's Figure 10).
     Sideways(Experimental),
@@ -38,10 +38,10 @@ enum Experiment {
     TurnInPlace(Experimental),
     /// Approaches over 10 m in steps of 10 %: the paper's overall claim.
     Claim(Experimental),
-    /// Approaches from 10 m to 2 m: the error at the end and whether the covariance says so.
+    /// Approaches from 10 m to 2 m: the final error and whether it agrees with the covariance.
     Approach(Experimental),
-    /// Slopes and slip with the pose by wheels and IMU, with a check of the slip, and with visual odometry (the paper's
-    /// Table II).
+    /// Slopes and slip with the pose from wheels and IMU, with a slip check, and with visual odometry (the paper's Table
+    /// II).
     Terrain(Experimental),
     /// Around a rock, step by step (the paper's Table III).
     #[command(name = "checkout-1")]
@@ -54,22 +54,23 @@ enum Experiment {
     Checkout3(Experimental),
     /// Occlusion, cloud, shadow, boundary, jumps: still tracked, or declared lost within the step?
     Faults(Experimental),
-    /// The K9 rover's three targets at 5, 7.5 and 10 m: what tracking by features adds to the error.
+    /// The K9 rover's three targets at 5, 7.5 and 10 m: the error added by feature tracking.
     #[command(name = "k9")]
     K9(Experimental),
-    /// Approaches from 10 m to 2 m by features: whether their covariance says how far off they are.
+    /// Approaches from 10 m to 2 m with features: whether the covariance agrees with the error.
     FeatureCovariance(Experimental),
     /// Occlusion, cloud, shadow, few features, wrong poses: does the confidence fall before the drift grows?
     FeatureFaults(Experimental),
-    /// Without features on the way: how far off may the target be for the shape to find it again?
+    /// Without features on the way: how large an error can the shape tracker recover from?
     Recovery(Experimental),
-    /// Visual odometry: how often it converges, how often it is silently wrong, and how it drifts.
+    /// Visual odometry: convergence rate, silent errors and drift.
     Odometry(OdometryStudy),
-    /// Drives on commands over slope, rock coverage, use of visual odometry and navigator: which arrive, and why others do not.
+    /// Commanded drives over slope, rock coverage, use of visual odometry and navigator: which arrive, and why others do
+    /// not.
     DriveGrid(DriveGridStudy),
-    /// The four checkouts on Mars as drives on commands, beside the paper's tables III and IV.
+    /// The four checkouts on Mars as commanded drives, compared with the paper's tables III and IV.
     Checkouts(CheckoutsStudy),
-    /// The K9 rover's three targets in one drive on commands, each handed over to the hazcams.
+    /// The K9 rover's three targets in one commanded drive, each handed over to the hazcams.
     #[command(name = "k9-day")]
     K9Day(K9DayStudy),
 }
@@ -80,35 +81,34 @@ struct Experimental {
     /// The seeds of the worlds; each world contributes all its targets.
     #[arg(long, value_delimiter = ',', value_name = "SEEDS", conflicts_with_all = ["worlds", "first_seed"])]
     seeds: Vec<u64>,
-    /// How many worlds; one that offers fewer targets than the scenario asks for is passed over and named.
+    /// Number of worlds; a world with fewer targets than the scenario requires is skipped and reported.
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..=1000))]
     worlds: u64,
     /// The seed of the first world; the others follow.
     #[arg(long, default_value_t = 1)]
     first_seed: u64,
-    /// The configurations: names that `sightline presets` lists, each with changes such as ncc+ncc_min=0.6; by default
-    /// the study's own.
+    /// The configurations: names from `sightline presets`, each with changes such as ncc+ncc_min=0.6; by default those of
+    /// the study.
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     configurations: Vec<String>,
-    /// Values of the study's variable; by default its own.
+    /// Values of the study's variable; by default those of the study.
     #[arg(long, value_delimiter = ',', value_name = "VALUES")]
     grid: Vec<String>,
-    /// The scenario of which the worlds are made, a file or a name that `sightline scenarios` lists, in place of the
-    /// study's own.
+    /// The scenario for the worlds, a file or a name from `sightline scenarios`, instead of the study's own.
     #[arg(long, value_name = "SCENARIO")]
     scenario: Option<PathBuf>,
-    /// The folder for worlds and results, by default one of the program's own; what is there already is used again.
+    /// The folder for worlds and results, by default one of the program's own; existing results are reused.
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
-    /// What is written to the standard output.
+    /// Output format.
     #[arg(long, default_value = "text")]
     format: Format,
 }
 
-/// What is written to the standard output.
+/// Output format.
 #[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
 enum Format {
-    /// One sentence a row.
+    /// One sentence per row.
     Text,
     /// One JSON object with all rows.
     Json,
@@ -126,7 +126,7 @@ impl Study {
     /// Runs the experiment.
     ///
     /// # Errors
-    /// A bad scenario, configuration or grid, too few worlds with targets enough, or a folder that cannot be written.
+    /// A bad scenario, configuration or grid, too few worlds with enough targets, or a folder that cannot be written.
     pub(super) fn run(self) -> Result<()> {
         match self.experiment {
             Experiment::Straight(arguments) => arguments.run("straight"),
@@ -153,12 +153,12 @@ impl Study {
 
 impl Experimental {
     fn run(self, name: &str) -> Result<()> {
-        // Everything is checked before anything is rendered.
+        // Checks all arguments before rendering.
         let order = self.order(name)?;
         let (folder, variable) = (order.folder.join(order.plan.study.name), order.plan.study.variable);
-        let told = Mutex::new(Teller::new());
+        let reporter = Mutex::new(ProgressReporter::new());
         let outcome =
-            study::carry_out(order, &AtomicBool::new(false), &|progress| lock(&told).tell(progress))?;
+            study::carry_out(order, &AtomicBool::new(false), &|progress| lock(&reporter).report(progress))?;
         terminal::error(&format!(
             "{} units, {} of them found now; the report is {}",
             outcome.units.len(),
@@ -201,7 +201,7 @@ impl Experimental {
         Ok(Order { command: self.command(name, &plan), plan, seeds, scenario, folder })
     }
 
-    /// The command line that does the same.
+    /// The command line that reproduces the study.
     fn command(&self, name: &str, plan: &Plan) -> String {
         let mut words = vec![format!("sightline study {name}")];
         if self.seeds.is_empty() {
@@ -225,7 +225,7 @@ fn join(seeds: &[u64]) -> String {
     seeds.iter().map(u64::to_string).collect::<Vec<_>>().join(",")
 }
 
-/// A row as one line for people.
+/// A row as one line of text.
 fn sentence(row: &Row) -> String {
     let number = |column: &str| row.number(column);
     let whole = |column: &str| number(column).map_or_else(|| "?".to_owned(), |v| format!("{v:.0}"));
@@ -260,18 +260,18 @@ fn sentence(row: &Row) -> String {
     )
 }
 
-/// Tells the progress of a study on the standard error.
-struct Teller {
+/// Reports the progress of a study on the standard error.
+struct ProgressReporter {
     units: Progress,
     rendering: Option<(String, Progress)>,
 }
 
-impl Teller {
+impl ProgressReporter {
     fn new() -> Self {
         Self { units: Progress::new("study: unit"), rendering: None }
     }
 
-    fn tell(&mut self, progress: study::Progress) {
+    fn report(&mut self, progress: study::Progress) {
         match progress {
             study::Progress::Units { k, n, .. } => self.units.tell(k, n),
             study::Progress::Rows(_) => {}

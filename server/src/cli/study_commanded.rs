@@ -1,4 +1,5 @@
-//! `sightline study checkouts` and `sightline study k9-day`: the papers' drives on commands, beside what the papers print.
+//! `sightline study checkouts` and `sightline study k9-day`: the papers' drives as commanded drives, with the published
+//! values.
 
 use clap::{Args, ValueEnum};
 use serde::Serialize;
@@ -12,11 +13,11 @@ use super::terminal::{self, Progress};
 /// The four checkouts.
 #[derive(Debug, Args)]
 pub(super) struct CheckoutsStudy {
-    /// Which of them.
+    /// Numbers of the checkouts.
     #[arg(long, value_name = "N", value_delimiter = ',', default_value = "1,2,3,4",
         value_parser = clap::value_parser!(u32).range(1..=4))]
     checkouts: Vec<u32>,
-    /// The configuration of the tracker; checkout 4 has `combined`, for the hand-off.
+    /// The configuration of the tracker; checkout 4 uses `combined`, for the hand-off.
     #[arg(long, value_name = "NAME", default_value = "ncc-scale-roll")]
     preset: String,
     /// The world's seed.
@@ -29,10 +30,10 @@ pub(super) struct CheckoutsStudy {
     format: Format,
 }
 
-/// K9's days.
+/// The days of K9.
 #[derive(Debug, Args)]
 pub(super) struct K9DayStudy {
-    /// How many worlds.
+    /// Number of worlds.
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..=1000))]
     worlds: u64,
     /// The seed of the first world; the others follow.
@@ -65,17 +66,17 @@ impl ImageOptions {
 /// Format of the output.
 #[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
 enum Format {
-    /// Lines for people.
+    /// One line of text per step or visit.
     Text,
-    /// One JSON object a drive or visit.
+    /// One JSON object per drive or visit.
     Jsonl,
 }
 
 impl CheckoutsStudy {
-    /// Drives the checkouts and writes each as it ends.
+    /// Drives the checkouts and writes each when it ends.
     ///
     /// # Errors
-    /// A preset that is not known, a world that cannot be driven in, or no room for images.
+    /// An unknown preset, a world in which no drive is possible, or no space for images.
     pub(super) fn run(&self) -> Result<()> {
         let folder = temporary()?;
         let mut progress = Progress::new("checkout");
@@ -94,10 +95,10 @@ impl CheckoutsStudy {
 }
 
 impl K9DayStudy {
-    /// Drives both days in every world and writes each visit as it ends.
+    /// Drives both days in every world and writes each visit when it ends.
     ///
     /// # Errors
-    /// A world that cannot be driven in, or no room for images.
+    /// A world in which no drive is possible, or no space for images.
     pub(super) fn run(&self) -> Result<()> {
         let folder = temporary()?;
         let mut progress = Progress::new("day");
@@ -152,7 +153,7 @@ fn json(value: &impl Serialize) -> Result<()> {
     terminal::line(&text)
 }
 
-/// The lines of a checkout; the paper's values in brackets.
+/// The lines of a checkout; the paper's values are in brackets.
 fn text(checkout: &Checkout) -> Vec<String> {
     let mut lines = vec![format!("checkout {}", checkout.number)];
     for step in &checkout.steps {

@@ -1,4 +1,4 @@
-//! `sightline study drive-grid`: drives on commands over slope, rock coverage, use of visual odometry and navigator.
+//! `sightline study drive-grid`: commanded drives over slope, rock coverage, use of visual odometry and navigator.
 
 use std::fs::OpenOptions;
 use std::io::Write;
@@ -14,22 +14,22 @@ use sightline_study::drive_grid::{Cell, CellSummary, DriveGrid, DriveRow};
 use super::drive_options::{NavigatorName, Odometry};
 use super::terminal::{self, Progress};
 
-/// The grid, and where its rows are kept.
+/// The grid and the file of rows.
 #[derive(Debug, Args)]
 pub(super) struct DriveGridStudy {
     /// Mean slopes of the ground, deg.
     #[arg(long, value_name = "DEG", value_delimiter = ',', default_value = "0,5,10,15")]
     slopes: Vec<f64>,
-    /// Parts of the ground that rocks cover.
+    /// Rock coverages, fractions of the ground.
     #[arg(long, value_name = "PART", value_delimiter = ',', default_value = "0,0.05,0.1")]
     coverages: Vec<f64>,
-    /// What visual odometry is used for.
+    /// The uses of visual odometry.
     #[arg(long, value_name = "USE", value_delimiter = ',', default_value = "off,slip-check,full")]
     odometry: Vec<Odometry>,
     /// The navigators.
     #[arg(long, value_name = "NAME", value_delimiter = ',', default_value = "gestalt")]
     navigators: Vec<NavigatorName>,
-    /// How many worlds for each place of the grid.
+    /// Number of worlds for each cell of the grid.
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u64).range(1..=10_000))]
     worlds: u64,
     /// The seed of the first world; the others follow.
@@ -41,21 +41,21 @@ pub(super) struct DriveGridStudy {
     /// Samples along each side of a pixel.
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=8))]
     samples_per_axis: u32,
-    /// A file with one JSON object a drive, to which each drive is added as it ends; drives of the same code that it has are not
-    /// driven again.
+    /// A file with one JSON object per drive, to which each drive is appended when it ends; drives that it contains from the
+    /// same code are not repeated.
     #[arg(long, value_name = "FILE")]
     rows: Option<PathBuf>,
-    /// What is written to the standard output.
+    /// Output format.
     #[arg(long, default_value = "text")]
     format: Format,
 }
 
-/// What is written to the standard output.
+/// Output format.
 #[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
 enum Format {
-    /// One line for each place of the grid.
+    /// One line for each cell of the grid.
     Text,
-    /// One JSON object with all rows and the places.
+    /// One JSON object with all rows and cells.
     Json,
 }
 
@@ -67,10 +67,10 @@ struct Document {
 }
 
 impl DriveGridStudy {
-    /// Drives and writes the outcome of each place.
+    /// Runs the drives and writes the outcome of each cell.
     ///
     /// # Errors
-    /// A grid of which no world can be made, a file that is not one of rows, or no room for images.
+    /// A grid for which no world can be created, a file that does not contain rows, or no space for images.
     pub(super) fn run(&self) -> Result<()> {
         let grid = self.grid();
         for cell in &grid.cells {
@@ -122,7 +122,7 @@ impl DriveGridStudy {
     }
 }
 
-/// The rows of a file; none where it does not exist yet.
+/// The rows of a file; none if the file does not exist yet.
 fn read(path: &Path) -> Result<Vec<DriveRow>> {
     let text = match std::fs::read_to_string(path) {
         Ok(text) => text,

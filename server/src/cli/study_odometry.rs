@@ -14,7 +14,7 @@ use super::terminal::{self, Progress};
 /// The drives and the settings.
 #[derive(Debug, Args)]
 pub(super) struct OdometryStudy {
-    /// How many worlds for each ground.
+    /// Number of worlds for each ground.
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..=10_000))]
     worlds: u64,
     /// The seed of the first world; the others follow.
@@ -35,21 +35,21 @@ pub(super) struct OdometryStudy {
     /// Samples along each side of a pixel.
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=8))]
     samples_per_axis: u32,
-    /// What is written to the standard output.
+    /// Output format.
     #[arg(long, default_value = "text")]
     format: Format,
 }
 
-/// The ground by its name.
+/// The ground by name.
 #[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
 enum SceneName {
-    /// Soil with rocks and texture; every step has a slip of 0 to 125 % that is drawn.
+    /// Soil with rocks and texture; every step has a random slip of 0 to 125 %.
     Textured,
     /// The same with the slip of soil and slope.
     Slope,
-    /// Smooth ground on which the rover looks back at its own tracks.
+    /// Smooth ground on which the rover sees its own tracks behind it.
     OwnTracks,
-    /// The same, straight on and without any texture of the ground.
+    /// The same, driving straight and without any texture of the ground.
     PicketFence,
     /// Ground without texture.
     Featureless,
@@ -67,10 +67,10 @@ impl From<SceneName> for Scene {
     }
 }
 
-/// The settings by their name.
+/// The settings by name.
 #[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
 pub(super) enum Configuration {
-    /// Ours.
+    /// The default settings of Sightline.
     Sightline,
     /// As flown on the Mars Exploration Rovers: 256 × 256 px, pseudo-normalised correlation.
     Mer2007,
@@ -85,7 +85,7 @@ impl Configuration {
     }
 }
 
-/// What is written to the standard output.
+/// Output format.
 #[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
 enum Format {
     /// One sentence for each ground and configuration.
@@ -102,10 +102,10 @@ struct Document {
 }
 
 impl OdometryStudy {
-    /// Drives and writes the rows.
+    /// Runs the drives and writes the rows.
     ///
     /// # Errors
-    /// A world that cannot be made, or no room for images.
+    /// A world that cannot be created, or no space for images.
     pub(super) fn run(&self) -> Result<()> {
         let folder = std::env::temp_dir().join(format!("sightline-odometry-{}", std::process::id()));
         let seeds: Vec<u64> = (self.first_seed..self.first_seed + self.worlds).collect();
@@ -148,7 +148,7 @@ impl OdometryStudy {
     }
 }
 
-/// A summary as one line for people.
+/// A summary as one line of text.
 fn sentence(found: &OdometrySummary) -> String {
     let wrong = found.silently_wrong_below_percent.map_or_else(
         || format!("{} silently wrong", found.silently_wrong),

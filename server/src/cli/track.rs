@@ -1,7 +1,7 @@
-//! `sightline track`: runs the tracker without a browser, by the very functions that the server calls.
+//! `sightline track`: runs the tracker without a browser, with the functions of the server.
 //!
-//! Each step is one line of JSON on the standard output as soon as it is computed, and each run ends with a
-//! line `{"summary": …}`. With several targets every line begins with the target's number.
+//! Writes each step as one line of JSON to the standard output as soon as it is computed, and ends each run with a line
+//! `{"summary": …}`. With several targets every line begins with the target's number.
 
 use std::io::{BufWriter, Write};
 use std::ops::ControlFlow;
@@ -28,7 +28,7 @@ use sightline_track::settings::{Changes, Settings, TrackerKind, parse_assignment
 use super::open;
 use super::terminal::{self, Progress};
 use crate::columns;
-use crate::exports::rows::Row;
+use crate::exports::rows::ExportRow;
 use crate::rerun_log::{self, RunLog};
 use crate::routes::photometry;
 
@@ -41,7 +41,7 @@ pub(super) struct Track {
     #[arg(long, value_name = "X,Y", value_parser = pixel, allow_hyphen_values = true,
         required_unless_present_any = ["target_in_rover", "target_in_site"])]
     target: Vec<Pixel>,
-    /// The mast angles at which that image was taken, deg; a pixel of another image is refused.
+    /// The mast angles at which that image was taken, deg; a mismatch is an error.
     #[arg(long, value_name = "AZ,EL", value_parser = angles, allow_hyphen_values = true, requires = "target")]
     mast: Option<MastAngles>,
     /// A target by its point in the rover frame of that stop, m; can be given more than once.
@@ -56,57 +56,57 @@ pub(super) struct Track {
     /// The pair in which the targets are designated and tracked, by its name at that stop; by default the main pair.
     #[arg(long, value_name = "NAME")]
     camera: Option<CameraName>,
-    /// The tracker, in its validated preset (sightline, features, shape or combined); beside --preset it replaces only the
-    /// tracker of that. By default the template tracker.
+    /// The tracker, in its validated preset (sightline, features, shape or combined); with --preset it replaces only the
+    /// tracker of that preset. By default the template tracker.
     #[arg(long, value_parser = trackers())]
     tracker: Option<TrackerKind>,
-    /// A named configuration, as `sightline presets` lists them; --set changes it further.
+    /// A named configuration from `sightline presets`; --set changes it further.
     #[arg(long, value_name = "NAME")]
     preset: Option<String>,
     /// A setting of the tracker, for example ncc_min=0.6; can be given more than once.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Also run both searches at every step, and report where coarse-to-fine differs from exhaustive.
+    /// Also run both searches at every step, and report where coarse-to-fine and exhaustive search differ.
     #[arg(long)]
     compare_searches: bool,
-    /// How the steps are written.
+    /// Output format of the steps.
     #[arg(long, default_value = "jsonl")]
     format: Format,
     /// Also write a Rerun recording, a new file.
     #[arg(long, value_name = "FILE")]
     rrd: Option<PathBuf>,
-    /// Also write a CSV table; with several targets they follow each other.
+    /// Also write a CSV table; several targets are written one after the other.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Also write a CSV table of the target's light: level, exposure, incidence, emission, phase; for one target.
+    /// Also write a CSV table of the target's illumination: level, exposure, incidence, emission, phase; for one target.
     #[arg(long, value_name = "FILE")]
     photometry: Option<PathBuf>,
 }
 
-/// How the steps are written.
+/// Output format of the steps.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Format {
-    /// One JSON object a step, then one with the summary.
+    /// One JSON object per step, then one with the summary.
     Jsonl,
 }
 
-/// Reads the word of a tracker.
+/// Parses the name of a tracker.
 fn trackers() -> impl TypedValueParser<Value = TrackerKind> {
     let words = TrackerKind::ALL.map(|tracker| PossibleValue::new(tracker.word()).help(tracker.about()));
     let of_word = |word: String| TrackerKind::ALL.into_iter().find(|tracker| tracker.word() == word);
     PossibleValuesParser::new(words).try_map(move |word| of_word(word).ok_or("unknown tracker"))
 }
 
-/// A line of a step.
+/// The output line of a step.
 #[derive(Serialize)]
 struct StepLine {
     #[serde(skip_serializing_if = "Option::is_none")]
     target: Option<usize>,
     #[serde(flatten)]
-    row: Row,
+    row: ExportRow,
 }
 
-/// A line of both searches of a step; nothing but the step where it searched nothing.
+/// The output line of both searches of a step; only the step number if the step had no search.
 #[derive(Serialize)]
 struct SearchLine {
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -118,9 +118,9 @@ struct SearchLine {
 /// Exhaustive and coarse-to-fine search with the same template.
 #[derive(Serialize)]
 struct Searches {
-    /// Whether both found the same whole pixel.
+    /// Whether both found the same integer pixel.
     is_same: bool,
-    /// Distance of both sub-pixel matches, px.
+    /// Distance between the sub-pixel matches, px.
     distance_px: f64,
     exhaustive_score: f64,
     coarse_to_fine_score: f64,
@@ -150,7 +150,7 @@ impl SearchLine {
     }
 }
 
-/// The line after the last step.
+/// The output line after the last step.
 #[derive(Serialize)]
 struct SummaryLine<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -172,7 +172,7 @@ impl Track {
             return Err(Error::format(path, "exists already; choose another name"));
         }
         let mut runs = Vec::new();
-        // All targets are designated first, so that a bad one is told before anything long begins.
+        // Designate all targets first, so that a bad one is reported before any long work.
         for place in self.places() {
             runs.push(vec![Arc::new(designate(&traverse, self.from_step, &place, &settings)?)]);
         }
@@ -225,7 +225,7 @@ impl Track {
     }
 }
 
-/// The first step of a run; says how far the surface lies from a point that was given.
+/// Computes the first step of a run; reports how far the surface is from a point that was given.
 fn designate(traverse: &Traverse, step: usize, place: &Place, settings: &Settings) -> Result<RunStep> {
     let named = place.name(traverse, step)?;
     let first = track::designate(traverse, named.designation, settings)?;
@@ -255,7 +255,7 @@ fn follow(
         if last.step + 1 >= traverse.stop_count() {
             break;
         }
-        // A stop that cannot be rendered is a fault of that step, which the step itself reports.
+        // If a stop cannot be rendered, the step itself reports the fault.
         let camera = first.update.target.designation.camera;
         let _ = traverse.render_camera(last.step + 1, camera, &AtomicBool::new(false));
         let next = Arc::new(track::advance(traverse, &first, &last, settings));
@@ -269,7 +269,7 @@ fn follow(
     terminal::line(&json(&SummaryLine { target, summary: &summary })?)
 }
 
-/// A copy without the stop's images, of which a long drive has more than fit into memory.
+/// A copy without the stop's images, because those of a long drive do not fit into memory.
 pub(super) fn without_images(trace: &RunStep) -> RunStep {
     let mut lighter = trace.clone();
     lighter.update.target.memory.set_image(Arc::default());
@@ -317,7 +317,7 @@ fn write_rrd(path: &Path, traverse: &Traverse, runs: &[Vec<Arc<RunStep>>]) -> Re
     rerun_log::export(path, &traverse.index().name, traverse, (&logs, None), &mut tell)
 }
 
-/// Reads `azimuth,elevation` in degrees.
+/// Parses `azimuth,elevation` in degrees.
 fn angles(text: &str) -> Result<MastAngles, String> {
     match numbers(text).as_deref() {
         Some([azimuth_deg, elevation_deg]) => Ok(MastAngles {
@@ -328,7 +328,7 @@ fn angles(text: &str) -> Result<MastAngles, String> {
     }
 }
 
-/// Reads `x,y,z`.
+/// Parses `x,y,z`.
 fn point(text: &str) -> Result<[f64; 3], String> {
     let point = numbers(text).and_then(|numbers| numbers.try_into().ok());
     point.ok_or_else(|| "write it as x,y,z in metres, for example 8,-1.2,0.1".to_owned())
@@ -338,7 +338,7 @@ fn numbers(text: &str) -> Option<Vec<f64>> {
     text.split(',').map(|part| part.trim().parse().ok()).collect()
 }
 
-/// Reads `x,y`.
+/// Parses `x,y`.
 pub(super) fn pixel(text: &str) -> Result<Pixel, String> {
     match numbers(text).as_deref() {
         Some([x, y]) => Ok(Pixel::new(*x, *y)),

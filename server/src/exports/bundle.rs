@@ -1,4 +1,4 @@
-//! What anybody needs to get the same rows again, bit for bit: settings, seed, versions, hashes and commands, as JSON.
+//! Everything needed to reproduce the same rows, bit for bit: settings, seed, versions, hashes and commands, as JSON.
 
 use serde_json::{Value, json};
 use sightline_geometry::cancel::Cancel;
@@ -8,7 +8,7 @@ use sightline_session::reproduce::{FORMAT, FORMAT_VERSION};
 use sightline_session::shell;
 use sightline_world::Scenario;
 
-use super::kind::Part;
+use super::kind::SessionPart;
 use super::rows;
 use super::source::{NamedRun, Source};
 use crate::drives;
@@ -19,7 +19,7 @@ use crate::version::VERSION;
 ///
 /// # Errors
 /// [`Error::Cancelled`](sightline_geometry::error::Error::Cancelled).
-pub(crate) fn json(source: &Source, part: Part, cancel: Cancel<'_>) -> Result<String> {
+pub(crate) fn json(source: &Source, part: SessionPart, cancel: Cancel<'_>) -> Result<String> {
     let traverse = &source.open.traverse;
     let index = traverse.index();
     let scenario = scenario(source);
@@ -44,8 +44,8 @@ pub(crate) fn json(source: &Source, part: Part, cancel: Cancel<'_>) -> Result<St
             "seed": scenario.as_ref().map(|scenario| scenario.seed),
             "scenario_sha256": scenario.as_ref().map(|scenario| hash(scenario.to_toml().as_bytes())),
             "scenario_toml": scenario.as_ref().map(Scenario::to_toml),
-            "driven": source.open.driven.as_ref().map(|driven| {
-                driven.with(|world| world.state().iter().take(index.stops.len()).cloned().collect::<Vec<_>>())
+            "driven": source.open.commanded.as_ref().map(|drive| {
+                drive.with(|world| world.state().iter().take(index.stops.len()).cloned().collect::<Vec<_>>())
             }),
         },
         "session": source.session.saved(),
@@ -56,7 +56,7 @@ pub(crate) fn json(source: &Source, part: Part, cancel: Cancel<'_>) -> Result<St
 }
 
 fn of_run(source: &Source, run: NamedRun<'_>, cancel: Cancel<'_>) -> Result<Value> {
-    let only = Part { target: Some(run.target), run: Some(run.number) };
+    let only = SessionPart { target: Some(run.target), run: Some(run.number) };
     let settings = serde_json::to_vec(run.run.settings.as_ref()).unwrap_or_default();
     Ok(json!({
         "target": run.target,
@@ -72,17 +72,17 @@ fn of_run(source: &Source, run: NamedRun<'_>, cancel: Cancel<'_>) -> Result<Valu
     }))
 }
 
-/// The command line that computes a run again; none for one that left another run on the way, or in a drive on commands.
+/// The command line that recomputes a run; `None` for a run forked after its first step, and in a commanded drive.
 pub(crate) fn command(source: &Source, run: NamedRun<'_>) -> Option<String> {
     let designation = run.record.designation;
-    if run.run.fork.is_some_and(|fork| fork.from_step > designation.step) || source.open.driven.is_some() {
+    if run.run.fork.is_some_and(|fork| fork.from_step > designation.step) || source.open.commanded.is_some() {
         return None;
     }
     Some(shell::track(&place_of_traverse(source), designation, &run.run.settings.changes()))
 }
 
-/// What a person would write for the traverse: the library's name of its scenario, or a word to be replaced. Where the
-/// folder lies on this machine is nobody else's business.
+/// The command-line argument for the traverse: the library name of its scenario, or a placeholder. The path of the folder on
+/// this machine is not disclosed.
 fn place_of_traverse(source: &Source) -> String {
     let own = scenario(source);
     match (own.as_ref().and_then(drives::library_name), own) {

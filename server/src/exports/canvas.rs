@@ -1,4 +1,5 @@
-//! A small picture to draw on: grey images, lines with a dark halo, and words; opaque, so that it becomes a plain RGB PNG.
+//! A small image to draw on: grey images, lines with a dark halo, and text; opaque, so that it can be saved as a plain RGB
+//! PNG.
 
 use std::sync::OnceLock;
 
@@ -13,12 +14,12 @@ use tiny_skia::{
 /// Red, green and blue.
 pub(super) type Rgb = [u8; 3];
 
-/// How a line is drawn.
+/// Line style.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Line {
-    /// Without gaps.
+pub(super) enum LineStyle {
+    /// A continuous line.
     Solid,
-    /// Dots.
+    /// A dotted line.
     Dotted,
 }
 
@@ -26,42 +27,43 @@ pub(super) enum Line {
 const WIDTH: f32 = 2.0;
 const HALO: f32 = 1.0;
 
-/// A picture that is being drawn; (0, 0) is the corner of its first pixel.
+/// An image to draw on; (0, 0) is the corner of its first pixel.
 pub(super) struct Canvas {
     pixmap: Pixmap,
 }
 
-/// The part of an image that is shown: its corner and how much it is magnified. Positions of the image count from the
-/// centre of its first pixel.
+/// The visible part of an image: its corner and magnification. Image positions are relative to the centre of the first
+/// pixel.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Window {
-    /// Where the upper left corner of the canvas' picture lies in the image, px from the corner of its first pixel.
+    /// Upper left corner of the visible part in the image, px from the corner of its first pixel.
     pub(super) origin: [f64; 2],
-    /// How many pixels of the canvas a pixel of the image takes.
+    /// Canvas pixels per image pixel.
     pub(super) scale: f64,
-    /// Where that corner lies on the canvas, px.
+    /// Position of that corner on the canvas, px.
     pub(super) at: [f64; 2],
     /// Width and height on the canvas, px.
     pub(super) size: [u32; 2],
 }
 
 impl Window {
-    /// Where a position in the image lies on the canvas.
-    pub(super) fn place(&self, x: f64, y: f64) -> [f32; 2] {
+    /// Maps a position in the image to the canvas.
+    pub(super) fn to_canvas(self, x: f64, y: f64) -> [f32; 2] {
         let axis = |k: usize, v: f64| ((v + 0.5 - self.origin[k]) * self.scale + self.at[k]) as f32;
         [axis(0, x), axis(1, y)]
     }
 }
 
 impl Canvas {
-    /// A picture of one colour; none when it has no pixels.
+    /// A canvas of one colour; `None` if it would have no pixels.
     pub(super) fn new(width: u32, height: u32, colour: Rgb) -> Option<Self> {
         let mut pixmap = Pixmap::new(width, height)?;
         pixmap.fill(opaque(colour));
         Some(Self { pixmap })
     }
 
-    /// Shows a part of an image, dark and bright stretched to black and white; what lies outside is a checker.
+    /// Draws a part of an image with its contrast stretched to black and white; pixels outside the image form a
+    /// chequerboard.
     pub(super) fn image(&mut self, image: &GrayImage, window: &Window) {
         let [low, high] = ends(image, window);
         let width = self.pixmap.width() as usize;
@@ -82,12 +84,12 @@ impl Canvas {
         }
     }
 
-    /// A line through points, perhaps closed, with a halo.
-    pub(super) fn line(&mut self, points: &[[f32; 2]], is_closed: bool, colour: Rgb, line: Line) {
+    /// Draws a polyline with a halo, closed if `is_closed`.
+    pub(super) fn line(&mut self, points: &[[f32; 2]], is_closed: bool, colour: Rgb, style: LineStyle) {
         let Some(path) = path(points, is_closed) else { return };
-        let gaps = match line {
-            Line::Solid => None,
-            Line::Dotted => StrokeDash::new(vec![1.0, 5.5], 0.0),
+        let gaps = match style {
+            LineStyle::Solid => None,
+            LineStyle::Dotted => StrokeDash::new(vec![1.0, 5.5], 0.0),
         };
         for (width, colour) in [(WIDTH + 2.0 * HALO, [0; 3]), (WIDTH, colour)] {
             let stroke = Stroke {
@@ -101,7 +103,7 @@ impl Canvas {
         }
     }
 
-    /// A filled rectangle.
+    /// Fills a rectangle.
     pub(super) fn fill(&mut self, [x, y]: [f32; 2], [width, height]: [f32; 2], colour: Rgb) {
         if let Some(rect) = Rect::from_xywh(x, y, width, height) {
             let path = PathBuilder::from_rect(rect);
@@ -109,14 +111,14 @@ impl Canvas {
         }
     }
 
-    /// A line of words whose upper left corner is given; what does not fit into `width` is cut.
+    /// Draws a line of text from its upper left corner, cut off at `width`.
     pub(super) fn text(&mut self, [x, y]: [f32; 2], size: f32, width: f32, colour: Rgb, words: &str) {
         let Some(font) = font() else { return };
         let scaled = font.as_scaled(PxScale::from(size));
         let mut at = x;
         let count = words.chars().count();
         for (k, c) in words.chars().enumerate() {
-            // The last letter that fits becomes an ellipsis when more would follow.
+            // If more letters would follow, the last one that fits becomes an ellipsis.
             let advance = scaled.h_advance(font.glyph_id('m'));
             let is_cut = at + 2.0 * advance > x + width && k + 1 < count;
             let c = match c {
@@ -144,7 +146,7 @@ impl Canvas {
         }
     }
 
-    /// Puts another picture on this one.
+    /// Copies another canvas into this one.
     pub(super) fn put(&mut self, other: &Canvas, [x, y]: [u32; 2]) {
         let (from, to) = (other.pixmap.width() as usize * 4, self.pixmap.width() as usize * 4);
         for row in 0..other.pixmap.height() as usize {
@@ -166,15 +168,15 @@ impl Canvas {
         self.pixmap.data().chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect()
     }
 
-    /// The picture as a PNG file.
+    /// Encodes the canvas as PNG.
     ///
     /// # Errors
-    /// What the encoder says.
+    /// The message of the encoder.
     pub(super) fn png(&self) -> Result<Vec<u8>, String> {
         let [width, height] = self.size();
         let image = RgbImage::from_raw(width, height, self.rgb()).ok_or("size and pixels disagree")?;
         let mut bytes = std::io::Cursor::new(Vec::new());
-        // Pictures are kept and sent: smaller is worth the time.
+        // Images are stored and sent, so a smaller size is worth the time.
         let encoder =
             PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive);
         image.write_with_encoder(encoder).map_err(|error| error.to_string())?;
@@ -207,7 +209,7 @@ fn paint(colour: Rgb) -> Paint<'static> {
 fn path(points: &[[f32; 2]], is_closed: bool) -> Option<Path> {
     let mut builder = PathBuilder::new();
     for (k, [x, y]) in points.iter().enumerate() {
-        // Far outside there is nothing to see, and the rasteriser has its limits.
+        // Points far outside are invisible and could exceed the limits of the rasteriser.
         let [x, y] = [x.clamp(-4096.0, 8192.0), y.clamp(-4096.0, 8192.0)];
         if k == 0 { builder.move_to(x, y) } else { builder.line_to(x, y) }
     }
@@ -217,13 +219,13 @@ fn path(points: &[[f32; 2]], is_closed: bool) -> Option<Path> {
     builder.finish()
 }
 
-/// The font of the pictures, which the viewer has too; none only where it cannot be read.
+/// The font of the exports, the same as in the viewer; `None` if it cannot be parsed.
 fn font() -> Option<&'static FontRef<'static>> {
     static FONT: OnceLock<Option<FontRef<'static>>> = OnceLock::new();
     FONT.get_or_init(|| FontRef::try_from_slice(epaint_default_fonts::HACK_REGULAR).ok()).as_ref()
 }
 
-/// The grey values of the window that become black and white: all but a hundredth at either end lies between.
+/// Grey values in the window that map to black and white: the 1 % and 99 % quantiles.
 fn ends(image: &GrayImage, window: &Window) -> [f32; 2] {
     let from = |k: usize| window.origin[k].floor().max(0.0) as u32;
     let to = |k: usize, size: u32| {
@@ -243,7 +245,8 @@ fn ends(image: &GrayImage, window: &Window) -> [f32; 2] {
     [low, high.max(low + 1e-3)]
 }
 
-/// The grey value at a position counted from the centre of the first pixel; none outside and where a pixel is invalid.
+/// Interpolates the grey value at a position relative to the centre of the first pixel; `None` outside the image and at
+/// invalid pixels.
 fn bilinear(image: &GrayImage, x: f64, y: f64) -> Option<f32> {
     let (width, height) = (f64::from(image.width()), f64::from(image.height()));
     if !(-0.5..width - 0.5).contains(&x) || !(-0.5..height - 0.5).contains(&y) {
@@ -265,7 +268,7 @@ mod tests {
     use image::Luma;
 
     #[test]
-    fn a_bright_pixel_is_where_its_position_says() {
+    fn a_pixel_is_drawn_at_its_position() {
         let mut image = GrayImage::from_pixel(9, 9, Luma([0.0]));
         image.put_pixel(5, 3, Luma([1.0]));
         let mut canvas = Canvas::new(40, 40, [9, 9, 9]).unwrap();
@@ -273,13 +276,13 @@ mod tests {
         canvas.image(&image, &window);
         let rgb = canvas.rgb();
         let brightest = (0..1600).max_by_key(|at| rgb[3 * at]).unwrap();
-        let [x, y] = window.place(5.0, 3.0);
+        let [x, y] = window.to_canvas(5.0, 3.0);
         let (found_x, found_y) = ((brightest % 40) as f32 + 0.5, (brightest / 40) as f32 + 0.5);
         assert!((found_x - x).abs() <= 1.0 && (found_y - y).abs() <= 1.0, "{found_x} {found_y} {x} {y}");
     }
 
     #[test]
-    fn words_leave_ink_and_stay_in_their_width() {
+    fn text_is_drawn_within_its_width() {
         let mut canvas = Canvas::new(100, 20, [0; 3]).unwrap();
         canvas.text([2.0, 2.0], 13.0, 50.0, [255; 3], "tracking, and much more than fits");
         let inked: Vec<usize> =

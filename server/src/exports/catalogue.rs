@@ -1,4 +1,4 @@
-//! The catalogue of exports: every file that can be made of a part of a session, and how large it will be.
+//! The catalogue of exports: every file available for a part of a session, with its size.
 
 use sightline_api::endpoint;
 use sightline_api::endpoints::ExportFile;
@@ -10,33 +10,33 @@ use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::Result;
 use sightline_rover::pair;
 
-use super::kind::{Kind, Part};
+use super::kind::{ExportFormat, SessionPart};
 use super::source::Source;
 use super::{bundle, rows, sheet};
 
-/// How large the file will be, known or estimated.
+/// Size of the file, exact or estimated.
 ///
 /// # Errors
 /// [`Error::Cancelled`](sightline_geometry::error::Error::Cancelled).
-fn size(kind: Kind, source: &Source, part: Part, cancel: Cancel<'_>) -> Result<Size> {
+fn size(kind: ExportFormat, source: &Source, part: SessionPart, cancel: Cancel<'_>) -> Result<Size> {
     let exact = |bytes: usize| Size { bytes: bytes as u64, is_exact: true };
     let about = |bytes: u64| Size { bytes, is_exact: false };
     let steps: usize = source.runs(part).iter().map(|run| run.run.steps.len()).sum();
     Ok(match kind {
-        Kind::Jsonl => exact(rows::jsonl(source, part, cancel)?.len()),
-        Kind::Csv => exact(rows::csv(source, part, cancel)?.len()),
-        Kind::Bundle => exact(bundle::json(source, part, cancel)?.len()),
-        // A page a column with its own head, then eight bytes a number.
-        Kind::Parquet => about(rows::column_count() * (310 + 7 * steps as u64)),
-        Kind::Animation => about(sheet::bytes_of_animation(source, part)),
-        Kind::Sheet => about(sheet::bytes_of_sheet(source, part)),
-        Kind::Report => about(25_000 + source.runs(part).len() as u64 * 530_000 + 330 * steps as u64),
-        Kind::Recording => about(recording_bytes(source, part)),
+        ExportFormat::Jsonl => exact(rows::jsonl(source, part, cancel)?.len()),
+        ExportFormat::Csv => exact(rows::csv(source, part, cancel)?.len()),
+        ExportFormat::Bundle => exact(bundle::json(source, part, cancel)?.len()),
+        // About 310 bytes of headers per column and 7 bytes per number.
+        ExportFormat::Parquet => about(rows::column_count() * (310 + 7 * steps as u64)),
+        ExportFormat::Animation => about(sheet::bytes_of_animation(source, part)),
+        ExportFormat::Sheet => about(sheet::bytes_of_sheet(source, part)),
+        ExportFormat::Report => about(25_000 + source.runs(part).len() as u64 * 530_000 + 330 * steps as u64),
+        ExportFormat::Recording => about(recording_bytes(source, part)),
     })
 }
 
-/// The images of every stop as PNG, and what the steps saw.
-fn recording_bytes(source: &Source, part: Part) -> u64 {
+/// Size of the images of every stop as PNG, and of the logged data of the steps.
+fn recording_bytes(source: &Source, part: SessionPart) -> u64 {
     let runs = source.runs(part);
     let traces = runs.iter().flat_map(|run| &run.run.steps);
     let mut stops: Vec<_> =
@@ -53,13 +53,13 @@ fn recording_bytes(source: &Source, part: Part) -> u64 {
     400_000 + images + 45_000 * steps
 }
 
-/// Everything that can be exported of a part of a session.
+/// The exports available for a part of a session.
 ///
 /// # Errors
 /// [`Error::Cancelled`](sightline_geometry::error::Error::Cancelled).
-pub(crate) fn catalogue(source: &Source, part: Part, cancel: Cancel<'_>) -> Result<Vec<ExportEntry>> {
-    let entry = |kind: Kind| {
-        let part = source.narrowed(kind, part);
+pub(crate) fn catalogue(source: &Source, part: SessionPart, cancel: Cancel<'_>) -> Result<Vec<ExportEntry>> {
+    let entry = |kind: ExportFormat| {
+        let part = source.resolve_part(kind, part);
         let session = &source.session.id;
         let at = AtExport { session: session.clone(), file: kind.name().to_owned() };
         Ok(ExportEntry {
@@ -72,11 +72,11 @@ pub(crate) fn catalogue(source: &Source, part: Part, cancel: Cancel<'_>) -> Resu
             command: format!("sightline export {} --session {session}{}", kind.name(), arguments(part)),
         })
     };
-    Kind::ALL.into_iter().map(entry).collect()
+    ExportFormat::ALL.into_iter().map(entry).collect()
 }
 
-/// Arguments of the command line that mean this part, behind a space.
-fn arguments(part: Part) -> String {
+/// Command-line arguments that select this part, with a leading space.
+fn arguments(part: SessionPart) -> String {
     match (part.target, part.run) {
         (Some(target), Some(run)) => format!(" --run {target}/{run}"),
         (Some(target), None) => format!(" --run {target}"),

@@ -1,10 +1,10 @@
-//! What can be exported: the names of the files, and what each is for.
+//! The kinds of exported files: name, media type, title and description.
 
-pub(crate) use sightline_api::query::SessionPart as Part;
+pub(crate) use sightline_api::query::SessionPart;
 
 /// A kind of file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub(crate) enum ExportFormat {
     /// A Rerun recording.
     Recording,
     /// Rows as JSON Lines.
@@ -19,11 +19,11 @@ pub(crate) enum Kind {
     Sheet,
     /// A report.
     Report,
-    /// What is needed to do the same again.
+    /// Everything needed to reproduce the rows.
     Bundle,
 }
 
-impl Kind {
+impl ExportFormat {
     /// All of them, in the order of the menu.
     pub(crate) const ALL: [Self; 8] = [
         Self::Report,
@@ -50,12 +50,12 @@ impl Kind {
         }
     }
 
-    /// The kind of that name.
+    /// The kind of a file name.
     pub(crate) fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.name() == name)
     }
 
-    /// What the bytes are.
+    /// The media type.
     pub(crate) const fn media_type(self) -> &'static str {
         match self {
             Self::Recording => "application/octet-stream",
@@ -69,7 +69,7 @@ impl Kind {
         }
     }
 
-    /// What it is called in a menu.
+    /// The title in a menu.
     pub(crate) const fn title(self) -> &'static str {
         match self {
             Self::Recording => "Rerun recording",
@@ -83,7 +83,7 @@ impl Kind {
         }
     }
 
-    /// What it holds and is good for, as one sentence.
+    /// Contents and purpose, as one sentence.
     pub(crate) const fn sentence(self) -> &'static str {
         match self {
             Self::Recording => {
@@ -107,7 +107,7 @@ impl Kind {
         }
     }
 
-    /// Whether it shows one run only.
+    /// Whether the file shows exactly one run.
     pub(crate) const fn is_of_one_run(self) -> bool {
         matches!(self, Self::Animation | Self::Sheet)
     }

@@ -1,13 +1,13 @@
-//! A session as files, for papers, scripts and other programs.
+//! Exports a session as files, for papers, scripts and other programs.
 //!
-//! Every file is made by [`make`], for REST and the command line alike; `kind` lists them. What is made takes its time in a
-//! lane of its own, and ends when the request goes away.
+//! [`make`] creates every file, for REST and the command line; `kind` lists the formats. Exports run in their own lane and
+//! are cancelled when the request is dropped.
 
 pub(crate) mod kind;
 pub(crate) mod catalogue;
 pub(crate) mod source;
 pub(crate) mod rows;
-pub(crate) mod picture;
+pub(crate) mod step_image;
 pub(crate) mod sheet;
 pub(crate) mod report;
 mod report_steps;
@@ -22,50 +22,50 @@ use tempfile::TempDir;
 use crate::problem::{ApiError, ApiResult};
 use crate::rerun_log::{self, RunLog};
 
-pub(crate) use kind::{Kind, Part};
+pub(crate) use kind::{ExportFormat, SessionPart};
 pub(crate) use report::note_html;
 pub(crate) use sheet::run_letter;
 pub(crate) use source::Source;
 
-/// What was made.
-pub(crate) enum Made {
+/// A finished export.
+pub(crate) enum ExportedFile {
     /// In memory.
     Bytes(Vec<u8>),
-    /// A file in a folder of its own, which is removed with this value.
+    /// A file in a temporary folder, which is removed with this value.
     File(std::fs::File, TempDir),
 }
 
-/// Makes a file; `progress` is told what is done of how much, where that is known.
+/// Creates a file; `progress` receives the number of finished parts and their total, if known.
 ///
 /// # Errors
-/// A problem when there is nothing to export, an image cannot be read, or `cancel` was set.
+/// A problem if there is nothing to export, an image cannot be read, or `cancel` was set.
 pub(crate) fn make(
     source: &Source,
-    kind: Kind,
-    part: Part,
+    kind: ExportFormat,
+    part: SessionPart,
     cancel: &AtomicBool,
     progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
-) -> ApiResult<Made> {
-    let part = source.narrowed(kind, part);
+) -> ApiResult<ExportedFile> {
+    let part = source.resolve_part(kind, part);
     Ok(match kind {
-        Kind::Jsonl => Made::Bytes(rows::jsonl(source, part, cancel.into())?.into_bytes()),
-        Kind::Csv => Made::Bytes(rows::csv(source, part, cancel.into())?.into_bytes()),
-        Kind::Parquet => Made::Bytes(rows::parquet(source, part, cancel.into())?),
-        Kind::Animation => Made::Bytes(sheet::animation(source, part, cancel)?),
-        Kind::Sheet => Made::Bytes(sheet::sheet(source, part, cancel)?),
-        Kind::Report => Made::Bytes(report::html(source, part, cancel)?.into_bytes()),
-        Kind::Bundle => Made::Bytes(bundle::json(source, part, cancel.into())?.into_bytes()),
-        Kind::Recording => recording(source, part, cancel, progress)?,
+        ExportFormat::Jsonl => ExportedFile::Bytes(rows::jsonl(source, part, cancel.into())?.into_bytes()),
+        ExportFormat::Csv => ExportedFile::Bytes(rows::csv(source, part, cancel.into())?.into_bytes()),
+        ExportFormat::Parquet => ExportedFile::Bytes(rows::parquet(source, part, cancel.into())?),
+        ExportFormat::Animation => ExportedFile::Bytes(sheet::animation(source, part, cancel)?),
+        ExportFormat::Sheet => ExportedFile::Bytes(sheet::sheet(source, part, cancel)?),
+        ExportFormat::Report => ExportedFile::Bytes(report::html(source, part, cancel)?.into_bytes()),
+        ExportFormat::Bundle => ExportedFile::Bytes(bundle::json(source, part, cancel.into())?.into_bytes()),
+        ExportFormat::Recording => recording(source, part, cancel, progress)?,
     })
 }
 
 /// A Rerun recording in a temporary folder.
 fn recording(
     source: &Source,
-    part: Part,
+    part: SessionPart,
     cancel: &AtomicBool,
     progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
-) -> ApiResult<Made> {
+) -> ApiResult<ExportedFile> {
     let internal = |error: std::io::Error| ApiError::internal(format!("cannot write a recording: {error}"));
     let folder = tempfile::tempdir().map_err(internal)?;
     let path = folder.path().join("session.rrd");
@@ -86,5 +86,5 @@ fn recording(
     let traverse = &source.open.traverse;
     let drive = source.drive.as_ref();
     rerun_log::export(&path, &traverse.index().name, traverse, (&runs, drive), &mut tell)?;
-    Ok(Made::File(std::fs::File::open(&path).map_err(internal)?, folder))
+    Ok(ExportedFile::File(std::fs::File::open(&path).map_err(internal)?, folder))
 }

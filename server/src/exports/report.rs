@@ -1,4 +1,4 @@
-//! A report of a session: one HTML page that needs nothing else, on light paper, made to be printed.
+//! A report of a session: one self-contained HTML page with a light background, suitable for printing.
 
 use std::fmt::Write;
 use std::sync::atomic::AtomicBool;
@@ -13,7 +13,7 @@ use sightline_session::step::RunStep;
 use sightline_session::{Fork, format};
 use sightline_track::settings::Changes;
 
-use super::kind::Part;
+use super::kind::SessionPart;
 use super::source::{NamedRun, Source};
 use super::{bundle, report_steps, sheet};
 use crate::html::{escape, markdown, number, table};
@@ -22,7 +22,7 @@ use crate::problem::{ApiError, ApiResult};
 use crate::study::chart::{Chart, Line};
 use crate::version::VERSION;
 
-/// How many runs have a chapter; of more, the first ones.
+/// Maximum number of runs with a chapter, first runs first.
 const MOST_RUNS: usize = 20;
 
 const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:1080px;margin:2rem auto;padding:0 1rem;color:#222;\
@@ -38,11 +38,11 @@ padding:.1rem .8rem;margin:.6rem 0;break-inside:avoid}.note p{margin:.3rem 0}.at
 @media print{body{margin:0;max-width:none;font-size:11pt}h2{break-before:page}h2:first-of-type{break-before:auto}\
 a{color:inherit;text-decoration:none}tr{break-inside:avoid}}";
 
-/// The report.
+/// Renders the report.
 ///
 /// # Errors
 /// A problem when it is cancelled or a figure cannot be drawn.
-pub(crate) fn html(source: &Source, part: Part, cancel: &AtomicBool) -> ApiResult<String> {
+pub(crate) fn html(source: &Source, part: SessionPart, cancel: &AtomicBool) -> ApiResult<String> {
     let index = source.open.traverse.index();
     let name = escape(&index.name);
     let mut text = format!(
@@ -113,7 +113,7 @@ fn overview(source: &Source, runs: &[NamedRun<'_>]) -> String {
     )
 }
 
-/// What a run does otherwise than the defaults: its settings, and the prediction that a person moved.
+/// Differences from the default run: changed settings, and a prediction moved by the user.
 fn changed(settings: &Changes, fork: Option<Fork>) -> String {
     let settings = (!settings.is_empty()).then(|| serde_json::to_string(settings).unwrap_or_default());
     let moved = fork.and_then(|fork| Some((fork.from_step, fork.prediction_px?)));
@@ -124,7 +124,7 @@ fn changed(settings: &Changes, fork: Option<Fork>) -> String {
 }
 
 /// The notes that belong to the part.
-fn notes(source: &Source, part: Part) -> String {
+fn notes(source: &Source, part: SessionPart) -> String {
     let is_meant = |note: &&Note| {
         note.pin.target.is_none_or(|target| {
             part.target.is_none_or(|wanted| wanted == target)
@@ -142,7 +142,7 @@ fn notes(source: &Source, part: Part) -> String {
     text
 }
 
-/// A note with where it is pinned.
+/// A note with its step, target and run.
 pub(crate) fn note_html(number: usize, note: &Note, session: &sightline_session::Session) -> String {
     let of = note.pin.target.map_or_else(String::new, |target| {
         let label = session.targets.get(target).map_or("a target", |record| record.label.as_str());
@@ -160,7 +160,7 @@ pub(crate) fn note_html(number: usize, note: &Note, session: &sightline_session:
     )
 }
 
-/// The metrics of a run, as the page and REST give them.
+/// The metrics of a run, as in the page and in REST.
 fn metrics_table(steps: &[std::sync::Arc<RunStep>]) -> String {
     let found = metrics(steps);
     let row = |metric: &Metric| {
@@ -179,7 +179,7 @@ fn metrics_table(steps: &[std::sync::Arc<RunStep>]) -> String {
     table(&caption, &["metric", "value", "steps used", "worst at"], &rows)
 }
 
-/// What there is to say of one run.
+/// The chapter of one run.
 fn chapter(text: &mut String, source: &Source, run: NamedRun<'_>, cancel: &AtomicBool) -> ApiResult<()> {
     let steps = &run.run.steps;
     let _ = writeln!(text, "<h2>{}</h2>", escape(&sheet::title(source, run)));
@@ -243,10 +243,10 @@ fn figures(steps: &[std::sync::Arc<RunStep>], run: &NamedRun<'_>) -> ApiResult<V
     charts.into_iter().filter_map(|(title, unit, lines)| drawn(title, unit, lines).transpose()).collect()
 }
 
-/// One chart; none where it has nothing to show.
+/// One chart; `None` without data.
 fn drawn(title: &str, unit: &str, lines: Vec<Line>) -> ApiResult<Option<String>> {
     let lines: Vec<Line> = lines.into_iter().filter(|line| !line.points.is_empty()).collect();
-    // A limit without what it limits says nothing.
+    // A gate without the gated quantity is not informative.
     if lines.first().is_none_or(|line| line.is_thin) {
         return Ok(None);
     }
@@ -261,7 +261,7 @@ fn number_of(name: &str, trace: &RunStep) -> Option<f64> {
     StageQuantity::named(name)?.number(trace)
 }
 
-/// The columns of the table of steps: a column of the row, the unit in which it is written, and its digits.
+/// The columns of the step table, each with its display unit and number of digits.
 const COLUMNS: [(&str, Unit, usize); 8] = [
     ("ncc", Unit::One, 3),
     ("stereo_score", Unit::One, 3),
@@ -297,7 +297,7 @@ fn step_table(steps: &[std::sync::Arc<RunStep>]) -> String {
     format!("<h3>Steps</h3>\n{}", table("Every step of the run.", &head, &rows))
 }
 
-/// Every number that the stages declare and the run has.
+/// Statistics of every declared stage quantity that occurs in the run.
 fn quantity_table(steps: &[std::sync::Arc<RunStep>]) -> String {
     let row = |quantity: StageQuantity| {
         let values: Vec<f64> = steps.iter().filter_map(|trace| quantity.number(trace)).collect();
@@ -338,7 +338,7 @@ fn configuration(source: &Source, run: NamedRun<'_>) -> String {
     )
 }
 
-/// Where the numbers come from.
+/// Provenance of the numbers: program, tracker and data.
 fn origin(source: &Source) -> String {
     let index = serde_json::to_vec(source.open.traverse.index()).unwrap_or_default();
     let rows = [

@@ -1,7 +1,7 @@
-//! The rows of runs as tables: JSON Lines, CSV and Parquet, one row a step, each beginning with target, label and run.
+//! The rows of runs as tables: JSON Lines, CSV and Parquet, one row per step, each starting with target, label and run.
 //!
-//! CSV and JSON Lines write numbers with all their digits; in Parquet they are DOUBLE and INT64. What is not known is null,
-//! empty in CSV. Units stand in the columns' names, and in Parquet as metadata of the file, `unit:<column>`.
+//! CSV and JSON Lines write numbers with full precision; Parquet stores DOUBLE and INT64. Unknown values are null, or empty
+//! in CSV. Units are part of the column names, and in Parquet also metadata of the file, `unit:<column>`.
 
 use std::sync::Arc;
 
@@ -20,7 +20,7 @@ use sightline_rover::version::tracker_version;
 use sightline_session::records::{columns, records, row_columns};
 use sightline_session::step::{RunStep, StepRow};
 
-use super::kind::Part;
+use super::kind::SessionPart;
 use super::source::Source;
 use crate::columns as csv;
 use crate::problem::{ApiError, ApiResult};
@@ -28,39 +28,39 @@ use crate::version::VERSION;
 
 /// One step as a JSON object: the columns of [`StepRow`], then the quantities of every stage as `stage.quantity`.
 #[derive(Serialize)]
-pub(crate) struct Row {
+pub(crate) struct ExportRow {
     #[serde(flatten)]
     row: StepRow,
     #[serde(flatten, serialize_with = "quantities")]
     records: Vec<StageRecord>,
 }
 
-impl From<&RunStep> for Row {
+impl From<&RunStep> for ExportRow {
     fn from(trace: &RunStep) -> Self {
         Self { row: trace.row(), records: records(trace) }
     }
 }
 
-/// A row with where it belongs.
+/// A row with its target and run.
 #[derive(Serialize)]
-struct Line<'a> {
+struct LabelledRow<'a> {
     target: usize,
     label: &'a str,
     run: usize,
     #[serde(flatten)]
-    row: Row,
+    row: ExportRow,
 }
 
-/// The columns before those of the record, and how they are read.
-type Place = (&'static str, fn(&Line<'_>) -> Value);
+/// A column in front of the record: its name and accessor.
+type LeadingColumn = (&'static str, fn(&LabelledRow<'_>) -> Value);
 
-const PLACES: [Place; 3] = [
-    ("target", |line| Value::Count(line.target as i64)),
-    ("label", |line| Value::Word(line.label.to_owned())),
-    ("run", |line| Value::Count(line.run as i64)),
+const LEADING_COLUMNS: [LeadingColumn; 3] = [
+    ("target", |labelled| Value::Count(labelled.target as i64)),
+    ("label", |labelled| Value::Word(labelled.label.to_owned())),
+    ("run", |labelled| Value::Count(labelled.run as i64)),
 ];
 
-/// The quantities that the row does not have, as fields.
+/// Serialises the quantities that are not part of the row as fields.
 fn quantities<S: Serializer>(records: &[StageRecord], serializer: S) -> std::result::Result<S::Ok, S::Error> {
     let own = &columns()[row_columns().len()..];
     serializer.collect_map(own.iter().map(|column| (column.name.as_str(), column.cell(records))))
@@ -70,73 +70,77 @@ fn quantities<S: Serializer>(records: &[StageRecord], serializer: S) -> std::res
 ///
 /// # Errors
 /// [`Error::Cancelled`](sightline_geometry::error::Error::Cancelled).
-fn lines<'a>(source: &'a Source, part: Part, cancel: Cancel<'_>) -> Result<Vec<Line<'a>>> {
-    let mut lines = Vec::new();
+fn labelled_rows<'a>(
+    source: &'a Source,
+    part: SessionPart,
+    cancel: Cancel<'_>,
+) -> Result<Vec<LabelledRow<'a>>> {
+    let mut labelled_rows = Vec::new();
     for run in source.runs(part) {
         for trace in &run.run.steps {
             cancel.check()?;
             let (label, row) = (&run.record.label, trace.as_ref().into());
-            lines.push(Line { target: run.target, label, run: run.number, row });
+            labelled_rows.push(LabelledRow { target: run.target, label, run: run.number, row });
         }
     }
-    Ok(lines)
+    Ok(labelled_rows)
 }
 
-/// One JSON object a line.
+/// One JSON object per line.
 ///
 /// # Errors
-/// As [`lines`].
-pub(crate) fn jsonl(source: &Source, part: Part, cancel: Cancel<'_>) -> Result<String> {
+/// As [`labelled_rows`].
+pub(crate) fn jsonl(source: &Source, part: SessionPart, cancel: Cancel<'_>) -> Result<String> {
     let mut text = String::new();
-    for line in lines(source, part, cancel)? {
+    for labelled in labelled_rows(source, part, cancel)? {
         cancel.check()?;
-        text.push_str(&serde_json::to_string(&line).unwrap_or_default());
+        text.push_str(&serde_json::to_string(&labelled).unwrap_or_default());
         text.push('\n');
     }
     Ok(text)
 }
 
-/// A table with a header.
+/// A CSV table with a header.
 ///
 /// # Errors
-/// As [`lines`].
-pub(crate) fn csv(source: &Source, part: Part, cancel: Cancel<'_>) -> Result<String> {
+/// As [`labelled_rows`].
+pub(crate) fn csv(source: &Source, part: SessionPart, cancel: Cancel<'_>) -> Result<String> {
     let mut table = header().join(",") + "\n";
-    for line in lines(source, part, cancel)? {
+    for labelled in labelled_rows(source, part, cancel)? {
         cancel.check()?;
-        let label = sightline_api::table::cell(line.label);
-        let cells = csv::csv_cells(columns(), &line.row.records);
-        table.push_str(&format!("{},{label},{},{cells}\n", line.target, line.run));
+        let label = sightline_api::table::cell(labelled.label);
+        let cells = csv::csv_cells(columns(), &labelled.row.records);
+        table.push_str(&format!("{},{label},{},{cells}\n", labelled.target, labelled.run));
     }
     Ok(table)
 }
 
 /// The number of columns.
 pub(crate) fn column_count() -> u64 {
-    (PLACES.len() + columns().len()) as u64
+    (LEADING_COLUMNS.len() + columns().len()) as u64
 }
 
 /// The names of all columns.
 fn header() -> Vec<&'static str> {
     let own = columns().iter().map(|column| column.header.as_str());
-    PLACES.iter().map(|(name, _)| *name).chain(own).collect()
+    LEADING_COLUMNS.iter().map(|(name, _)| *name).chain(own).collect()
 }
 
 /// A Parquet file.
 ///
 /// # Errors
-/// A problem when it is cancelled, or with what the library says.
-pub(crate) fn parquet(source: &Source, part: Part, cancel: Cancel<'_>) -> ApiResult<Vec<u8>> {
-    let lines = lines(source, part, cancel)?;
-    written(source, &lines, cancel).map_err(|error| {
-        let said = || ApiError::internal(format!("Parquet: {error}"));
-        cancel.check().map_or_else(ApiError::from, |()| said())
+/// A problem when it is cancelled, or with the message of the Parquet library.
+pub(crate) fn parquet(source: &Source, part: SessionPart, cancel: Cancel<'_>) -> ApiResult<Vec<u8>> {
+    let labelled_rows = labelled_rows(source, part, cancel)?;
+    written(source, &labelled_rows, cancel).map_err(|error| {
+        let internal = || ApiError::internal(format!("Parquet: {error}"));
+        cancel.check().map_or_else(ApiError::from, |()| internal())
     })
 }
 
 fn written(
     source: &Source,
-    lines: &[Line<'_>],
+    labelled_rows: &[LabelledRow<'_>],
     cancel: Cancel<'_>,
 ) -> std::result::Result<Vec<u8>, ParquetError> {
     let kinds = [Kind::Count, Kind::Word, Kind::Count].into_iter();
@@ -151,15 +155,16 @@ fn written(
         });
     }
     schema.push('}');
-    let said = |key: &str, value: String| KeyValue::new(key.to_owned(), value);
+    let entry = |key: &str, value: String| KeyValue::new(key.to_owned(), value);
     let units = columns().iter().filter(|column| column.kind == Kind::Number);
-    let mut about: Vec<KeyValue> =
-        units.map(|column| said(&format!("unit:{}", column.header), column.unit.word().to_owned())).collect();
-    about.push(said("sightline", VERSION.to_owned()));
-    about.push(said("tracker", tracker_version()));
-    about.push(said("traverse", source.open.id.clone()));
-    about.push(said("session", source.session.id.clone()));
-    about.push(said("pixel_convention", "(0, 0) is the centre of the first pixel".to_owned()));
+    let mut about: Vec<KeyValue> = units
+        .map(|column| entry(&format!("unit:{}", column.header), column.unit.word().to_owned()))
+        .collect();
+    about.push(entry("sightline", VERSION.to_owned()));
+    about.push(entry("tracker", tracker_version()));
+    about.push(entry("traverse", source.open.id.clone()));
+    about.push(entry("session", source.session.id.clone()));
+    about.push(entry("pixel_convention", "(0, 0) is the centre of the first pixel".to_owned()));
     let properties = WriterProperties::builder()
         .set_compression(Compression::UNCOMPRESSED)
         .set_key_value_metadata(Some(about))
@@ -170,11 +175,11 @@ fn written(
     for (index, kind) in kinds.into_iter().enumerate() {
         cancel.check().map_err(|error| ParquetError::External(Box::new(error)))?;
         if let Some(column) = group.next_column()? {
-            let cell = |line: &Line<'_>| match PLACES.get(index) {
-                Some((_, place)) => place(line),
-                None => columns()[index - PLACES.len()].cell(&line.row.records),
+            let cell = |labelled: &LabelledRow<'_>| match LEADING_COLUMNS.get(index) {
+                Some((_, value_of)) => value_of(labelled),
+                None => columns()[index - LEADING_COLUMNS.len()].cell(&labelled.row.records),
             };
-            write_column(column, kind, lines.iter().map(cell))?;
+            write_column(column, kind, labelled_rows.iter().map(cell))?;
         }
     }
     group.close()?;
@@ -213,7 +218,7 @@ fn write_column(
     column.close()
 }
 
-/// The known values, and for every row whether it has one.
+/// The known values, and for every row 1 if it has a value, else 0 (Parquet definition levels).
 fn split<T>(values: impl Iterator<Item = Option<T>>) -> (Vec<T>, Vec<i16>) {
     let (mut known, mut levels) = (Vec::new(), Vec::new());
     for value in values {

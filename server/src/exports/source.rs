@@ -1,4 +1,4 @@
-//! What exports are made of: a session as it stands, its notes and its traverse.
+//! The input of exports: a snapshot of a session, its notes and its traverse.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -9,14 +9,14 @@ use sightline_session::{Run, Session, TargetRecord};
 use sightline_track::trace::StepTrace;
 use sightline_vision::image::GrayImage;
 
-use super::kind::{Kind, Part};
-use crate::driven;
+use super::kind::{ExportFormat, SessionPart};
+use crate::commanded_drive;
 use crate::live_session::LiveSession;
 use crate::problem::{ApiError, ApiResult};
 use crate::rendering::OpenTraverse;
 use crate::rerun_log::DriveLog;
 
-/// A session as it stands; its steps are shared, so that this costs little.
+/// A snapshot of a session; cheap, because the steps are shared.
 pub(crate) struct Source {
     /// The session.
     pub session: Session,
@@ -24,35 +24,35 @@ pub(crate) struct Source {
     pub notes: Notes,
     /// Its traverse.
     pub open: Arc<OpenTraverse>,
-    /// Its drive; `None` where nobody drives.
+    /// Its commanded drive; `None` if the session is not steered.
     pub drive: Option<DriveLog>,
 }
 
-/// A run with its numbers.
+/// A run with its indices.
 #[derive(Clone, Copy)]
 pub(crate) struct NamedRun<'a> {
-    /// The target's number.
+    /// The index of the target.
     pub target: usize,
     /// The target.
     pub record: &'a TargetRecord,
-    /// The run's number within the target.
+    /// The index of the run within the target.
     pub number: usize,
     /// The run.
     pub run: &'a Run,
 }
 
 impl Source {
-    /// The session as it stands now.
+    /// Takes a snapshot of the session.
     pub(crate) fn of(live: &LiveSession) -> Self {
         let (session, notes) = live.with(|session| (session.clone(), live.with_notes(|notes| notes.clone())));
-        Self { session, notes, open: live.traverse(), drive: driven::log(live) }
+        Self { session, notes, open: live.traverse(), drive: commanded_drive::log(live) }
     }
 
-    /// Checks that what is asked for is there.
+    /// Checks that the requested part exists and has a run with steps.
     ///
     /// # Errors
-    /// A problem that names what is not.
-    pub(crate) fn check(&self, kind: Kind, part: Part) -> ApiResult<()> {
+    /// A problem that names the missing part.
+    pub(crate) fn check(&self, kind: ExportFormat, part: SessionPart) -> ApiResult<()> {
         let missing = |error: sightline_geometry::error::Error| ApiError::from(error).about_path();
         match (part.target, part.run) {
             (Some(target), Some(run)) => self.session.run(target, run).map(|_| ()).map_err(missing)?,
@@ -60,48 +60,48 @@ impl Source {
             (None, Some(_)) => return Err(ApiError::invalid("query", "run: needs target beside it")),
             (None, None) => {}
         }
-        if self.runs(self.narrowed(kind, part)).is_empty() {
+        if self.runs(self.resolve_part(kind, part)).is_empty() {
             return Err(ApiError::conflict("There is nothing to export: no run has a step yet.")
                 .hint("Pick a target first."));
         }
         Ok(())
     }
 
-    /// The part that a kind shows: of one run where it shows one, by default the one that is looked at.
-    pub(crate) fn narrowed(&self, kind: Kind, part: Part) -> Part {
+    /// The part that a kind shows: for kinds that show one run, by default the selected run.
+    pub(crate) fn resolve_part(&self, kind: ExportFormat, part: SessionPart) -> SessionPart {
         if !kind.is_of_one_run() {
             return part;
         }
-        let looked_at = Part { target: self.session.cursor.target, run: Some(self.session.cursor.run) };
-        let is_there = |part: Part| part.target.is_some() && !self.runs(part).is_empty();
+        let selected = SessionPart { target: self.session.cursor.target, run: Some(self.session.cursor.run) };
+        let has_runs = |part: SessionPart| part.target.is_some() && !self.runs(part).is_empty();
         match part {
-            Part { run: Some(_), .. } => part,
-            Part { target: Some(target), .. } if looked_at.target != Some(target) => {
-                Part { run: Some(0), ..part }
+            SessionPart { run: Some(_), .. } => part,
+            SessionPart { target: Some(target), .. } if selected.target != Some(target) => {
+                SessionPart { run: Some(0), ..part }
             }
-            _ if is_there(looked_at) => looked_at,
+            _ if has_runs(selected) => selected,
             _ => {
                 let first = self.runs(part).first().map(|run| (run.target, run.number));
-                Part { target: first.map(|(target, _)| target), run: first.map(|(_, run)| run) }
+                SessionPart { target: first.map(|(target, _)| target), run: first.map(|(_, run)| run) }
             }
         }
     }
 
-    /// The runs of a part that have steps; removed ones and those of removed targets are left out.
-    pub(crate) fn runs(&self, part: Part) -> Vec<NamedRun<'_>> {
-        let is_meant = |target: usize| part.target.is_none_or(|wanted| wanted == target);
+    /// The runs of a part that have steps, without removed runs and targets.
+    pub(crate) fn runs(&self, part: SessionPart) -> Vec<NamedRun<'_>> {
+        let is_included = |target: usize| part.target.is_none_or(|wanted| wanted == target);
         let targets = self.session.targets.iter().enumerate();
-        let targets = targets.filter(|(number, record)| !record.removed && is_meant(*number));
+        let targets = targets.filter(|(number, record)| !record.removed && is_included(*number));
         let of_target = targets.flat_map(|(target, record)| {
             let runs = record.runs.iter().enumerate().filter(|(_, run)| !run.removed);
             runs.map(move |(number, run)| NamedRun { target, record, number, run })
         });
-        let is_meant = |run: &NamedRun<'_>| part.run.is_none_or(|wanted| wanted == run.number);
-        of_target.filter(|run| !run.run.steps.is_empty() && is_meant(run)).collect()
+        let is_included = |run: &NamedRun<'_>| part.run.is_none_or(|wanted| wanted == run.number);
+        of_target.filter(|run| !run.run.steps.is_empty() && is_included(run)).collect()
     }
 
-    /// The name under which a file is saved: of our own names alone.
-    pub(crate) fn file_name(&self, kind: Kind, part: Part) -> String {
+    /// The suggested file name, composed of the server's own names only.
+    pub(crate) fn file_name(&self, kind: ExportFormat, part: SessionPart) -> String {
         let of = match (part.target, part.run) {
             (Some(target), Some(run)) => format!("-target-{target}-run-{run}"),
             (Some(target), None) => format!("-target-{target}"),
@@ -110,10 +110,10 @@ impl Source {
         format!("sightline-{}{of}-{}", self.session.id, kind.name())
     }
 
-    /// The left and right image of the pair in which a step was tracked.
+    /// The left and right image of the pair used for tracking a step.
     ///
     /// # Errors
-    /// As [`OpenTraverse::make_ready`]; a damaged file, and a stop that lacks the pair.
+    /// As [`OpenTraverse::make_ready`]; also a damaged file, or a stop without the pair.
     pub(crate) fn images(
         &self,
         trace: &StepTrace,
@@ -126,8 +126,8 @@ impl Source {
     }
 }
 
-/// Where to look in the left image to see a step's target, px: where it was found, else where it should be.
-pub(crate) fn place_of(trace: &StepTrace) -> Option<Pixel> {
+/// The position of a step's target in the left image, px: the match, else the prediction, else the designation.
+pub(crate) fn target_pixel(trace: &StepTrace) -> Option<Pixel> {
     let found = trace.located().and_then(|located| located.left_pixel);
     let predicted = || trace.point_mast.predicted_left;
     let designated = || {

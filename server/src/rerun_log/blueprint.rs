@@ -1,17 +1,17 @@
-//! How a viewer lays a recording out.
+//! The layout of a recording in the Rerun viewer.
 //!
 //! ```text
 //! ┌ left image ────────┬ right image ───────┬ map ───────────────┐
 //! ├ one tab per run ───┴────────────────────┴────────────────────┤
-//! │ close-up    │ six patches  │ surface    │ time series in tabs │
+//! │ close-up    │ six patches  │ score map  │ time series in tabs │
 //! ├ states over time ──┴────────────────────┼ log │ about ───────┤
 //! └─────────────────────────────────────────┴────────────────────┘
 //! ```
-//! An entity shows only in the views that name it: what lies over the left image is listed here and not found
-//! by its path, because paths follow the stages and not the pictures. The close-up shows the same as the left
-//! image, from the frame of the subframe, which goes with the target. A run that asks for the shape has two tabs, “Match”
-//! and “Shape”; the second has what the shape tracker saw, the meshes and how well they fit. Beside the left image is a tab with
-//! the corners of odometry, where stops have it. The map also has goal, ground and paths of a drive on commands, the log its decisions.
+//! A view shows exactly the entities that it lists. Overlays of the left image are listed here instead of being found by
+//! path, because paths follow the stages and not the images. The close-up shows the same entities as the left image, in the
+//! frame of the subframe, which moves with the target. A run with the shape tracker has two tabs, “Match” and “Shape”; the
+//! second has the shape tracker's images, the meshes and how well they fit. If stops have odometry, a tab beside the left
+//! image shows its corners. For a commanded drive, the map also shows goal, ground and paths, and the log its decisions.
 
 use std::collections::BTreeSet;
 
@@ -28,14 +28,14 @@ use rerun::external::re_sdk_types::blueprint::archetypes::{
 use sightline_geometry::camera::CameraName;
 
 use super::Logged;
-use super::border::point_3d;
+use super::convert::point_3d;
 use super::images;
-use super::layout::{self, Container, Part, View};
+use super::layout::{self, Container, LayoutNode, View};
 use super::map::Outlook;
 use super::palette::{MAP_BACKGROUND, color};
 use super::step::path;
 
-/// What lies over the left image.
+/// Overlays of the left image.
 const LEFT: [&str; 15] = [
     "/{target}/predict/left",
     "/{target}/point_mast/gate",
@@ -54,7 +54,7 @@ const LEFT: [&str; 15] = [
     "/truth/{target}/left",
 ];
 
-/// What lies over the right image.
+/// Overlays of the right image.
 const RIGHT: [&str; 4] = [
     "/{target}/predict/right",
     "/{target}/locate/point_stereo/curve",
@@ -62,7 +62,7 @@ const RIGHT: [&str; 4] = [
     "/{target}/locate/match_features/partners",
 ];
 
-/// What of a target is on the map.
+/// Entities of a target on the map.
 const MAP: [&str; 14] = [
     "/{target}/predict/position",
     "/{target}/predict/covariance",
@@ -80,7 +80,7 @@ const MAP: [&str; 14] = [
     "/truth/{target}/position",
 ];
 
-/// The patches, in the order of the strip.
+/// The patches, in display order.
 const PATCHES: [(&str, &str); 6] = [
     ("reference", "/{target}/locate/scale_roll/reference"),
     ("scaled", "/{target}/locate/scale_roll/scaled"),
@@ -90,7 +90,7 @@ const PATCHES: [(&str, &str); 6] = [
     ("right", "/{target}/locate/point_stereo/right_window"),
 ];
 
-/// What the shape tracker saw, in the order of its steps.
+/// Images of the shape tracker, in the order of its stages.
 #[rustfmt::skip]
 const SHAPE: [(&str, &str); 9] = [
     ("disparities, px", "/{target}/locate/surface/disparities"),
@@ -104,7 +104,7 @@ const SHAPE: [(&str, &str); 9] = [
     ("where it was found", "/{target}/locate/hand_off/draped_match"),
 ];
 
-/// The meshes with the target.
+/// The meshes and the target.
 const MESHES: [&str; 4] = [
     "/{target}/locate/refine_register/mesh_fixed",
     "/{target}/locate/refine_register/mesh_moving",
@@ -112,7 +112,7 @@ const MESHES: [&str; 4] = [
     "/{target}/locate/refine_register/covariance",
 ];
 
-/// How well the surfaces fit.
+/// Quality of the mesh registration.
 #[rustfmt::skip]
 const FIT: [Series; 4] = [
     ("mean distance, m", Corner2D::LeftTop, &["/{target}/locate/coarse_register/mean_m", "/{target}/locate/refine_register/mean_m"]),
@@ -121,10 +121,10 @@ const FIT: [Series; 4] = [
     ("sigma, m", Corner2D::LeftTop, &["/{target}/locate/refine_register/sigma_m/**"]),
 ];
 
-/// A time series: its name, the corner that its lines mostly leave free, and its lines.
+/// A time series: its name, the legend corner, which its lines rarely cross, and its entities.
 type Series = (&'static str, Corner2D, &'static [&'static str]);
 
-/// What the tracker decided on.
+/// Quantities that determine the tracker's decisions.
 #[rustfmt::skip]
 const DECISIONS: [Series; 8] = [
     ("scores", Corner2D::LeftBottom, &["/{target}/judge/ncc/**", "/{target}/judge/stereo_ncc/**", "/{target}/locate/match_template/second_peak_ratio"]),
@@ -137,7 +137,7 @@ const DECISIONS: [Series; 8] = [
     ("exposure", Corner2D::LeftTop, &["/{target}/capture/subframe_mean", "/{target}/capture/subframe_saturated"]),
 ];
 
-/// How right it was.
+/// Errors against the ground truth.
 #[rustfmt::skip]
 const ERRORS: [Series; 4] = [
     ("pixels", Corner2D::LeftTop, &["/truth/{target}/err_px", "/truth/{target}/tolerance_px", "/{target}/update/correction_px", "/{target}/locate/point_stereo/across_px", "/{target}/locate/triangulate/gap_px"]),
@@ -146,19 +146,19 @@ const ERRORS: [Series; 4] = [
     ("nees", Corner2D::LeftTop, &["/truth/{target}/nees"]),
 ];
 
-/// One run as the layout needs it.
+/// A run as seen by the layout.
 pub(super) struct Lane<'a> {
     /// Its name in entity paths.
     pub(super) root: &'a str,
     /// Width and height of the close-up, px.
     pub(super) close_up_px: [u32; 2],
-    /// Whether its tracker asks for the shape: such a run has a tab more.
+    /// Whether it uses the shape tracker, which needs another tab.
     pub(super) has_shape: bool,
-    /// The pair in which its target is tracked; `None`: the main pair.
+    /// The pair used for tracking its target; `None` for the main pair.
     pub(super) camera: Option<CameraName>,
 }
 
-/// Sends the layout for these runs; a live one follows the newest step, and one with odometry has a tab for it.
+/// Sends the layout for these runs; a live recording follows the newest step, and one with odometry has a tab for it.
 pub(super) fn send(
     stream: &rerun::RecordingStream,
     lanes: &[Lane<'_>],
@@ -183,8 +183,8 @@ pub(super) fn send(
     layout::send(rows.with_shares([4.0, 4.0, 2.0]), &panels, stream)
 }
 
-/// The images of every pair in which a target is tracked, each with its own runs.
-fn pictures(lanes: &[Lane<'_>], odometry: &BTreeSet<Option<CameraName>>) -> Vec<Part> {
+/// The images of every pair used for tracking, each with the overlays of its runs.
+fn pictures(lanes: &[Lane<'_>], odometry: &BTreeSet<Option<CameraName>>) -> Vec<LayoutNode> {
     let cameras: BTreeSet<_> = lanes.iter().map(|lane| lane.camera).collect();
     let of_camera = |camera: Option<CameraName>| {
         let own = lanes.iter().filter(|lane| lane.camera == camera);
@@ -207,12 +207,12 @@ fn pictures(lanes: &[Lane<'_>], odometry: &BTreeSet<Option<CameraName>>) -> Vec<
     cameras.into_iter().flat_map(of_camera).collect()
 }
 
-fn picture(name: &str, origin: &str, overlays: &[&str], roots: &[&str]) -> Part {
+fn picture(name: &str, origin: &str, overlays: &[&str], roots: &[&str]) -> LayoutNode {
     let contents = std::iter::once("$origin".to_owned()).chain(of_all(overlays, roots));
     View::new("2D", name, contents).with_origin(origin).into()
 }
 
-fn map(outlook: &Outlook, roots: &[&str]) -> Part {
+fn map(outlook: &Outlook, roots: &[&str]) -> LayoutNode {
     let of_rover = ["/rover/**", "/drive/**"].map(str::to_owned);
     let contents = of_rover.into_iter().chain(of_all(&MAP, roots));
     let eye = EyeControls3D::new()
@@ -225,14 +225,14 @@ fn map(outlook: &Outlook, roots: &[&str]) -> Part {
         .into()
 }
 
-/// The truth is white, so that the sky must be dark in any theme.
+/// The ground truth is white, so the background must be dark in any theme.
 fn background() -> Background {
     Background::new(BackgroundKind::SolidColor).with_color(color(MAP_BACKGROUND))
 }
 
-/// What one run shows below the images.
-fn run(lane: &Lane<'_>) -> Part {
-    let patch = |(name, entity): (&str, &str)| -> Part {
+/// The views of one run below the images.
+fn run(lane: &Lane<'_>) -> LayoutNode {
+    let patch = |(name, entity): (&str, &str)| -> LayoutNode {
         View::new("2D", name, ["$origin"]).with_origin(path(entity, lane.root)).into()
     };
     let surface = View::new("2D", "surface of scores", ["$origin/**"])
@@ -254,9 +254,9 @@ fn run(lane: &Lane<'_>) -> Part {
     Container::new(Tabs, [matched.with_name("Match").into(), shape(lane)]).with_name(lane.root).into()
 }
 
-/// What the shape tracker of a run shows.
-fn shape(lane: &Lane<'_>) -> Part {
-    let picture = |(name, entity): (&str, &str)| -> Part {
+/// The views of the shape tracker of a run.
+fn shape(lane: &Lane<'_>) -> LayoutNode {
+    let picture = |(name, entity): (&str, &str)| -> LayoutNode {
         View::new("2D", name, ["$origin/**"]).with_origin(path(entity, lane.root)).into()
     };
     let meshes = View::new("3D", "meshes", of_all(&MESHES, &[lane.root]));
@@ -268,7 +268,7 @@ fn shape(lane: &Lane<'_>) -> Part {
     Container::new(Horizontal, parts).with_name("Shape").with_shares([14.0, 7.0, 6.0]).into()
 }
 
-fn close_up(lane: &Lane<'_>) -> Part {
+fn close_up(lane: &Lane<'_>) -> LayoutNode {
     let contents = std::iter::once(images::of_camera(lane.camera, "left")).chain(of_all(&LEFT, &[lane.root]));
     let [x_range, y_range] = lane.close_up_px.map(|length| [0.0, f64::from(length)].into());
     View::new("2D", "close-up", contents)
@@ -277,8 +277,8 @@ fn close_up(lane: &Lane<'_>) -> Part {
         .into()
 }
 
-fn time_series(series: &[Series], root: &str) -> Part {
-    let view = |(name, corner, entities): &Series| -> Part {
+fn time_series(series: &[Series], root: &str) -> LayoutNode {
+    let view = |(name, corner, entities): &Series| -> LayoutNode {
         let contents = entities.iter().map(|entity| path(entity, root));
         let legend = PlotLegend::new().with_corner(*corner);
         View::new("TimeSeries", *name, contents).with_property("PlotLegend", legend).into()
@@ -286,10 +286,10 @@ fn time_series(series: &[Series], root: &str) -> Part {
     Container::new(Tabs, series.iter().map(view)).into()
 }
 
-fn words(roots: &[&str]) -> Part {
+fn words(roots: &[&str]) -> LayoutNode {
     let decisions = std::iter::once("/drive/decision".to_owned());
     let log = View::new("TextLog", "log", decisions.chain(of_all(&["/{target}/judge/verdict"], roots)));
-    let document = |name: &str, origin: String| -> Part {
+    let document = |name: &str, origin: String| -> LayoutNode {
         View::new("TextDocument", name, ["$origin"]).with_origin(origin).into()
     };
     let labels = roots.iter().map(|root| document(root, path("/{target}", root)));

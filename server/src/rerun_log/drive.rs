@@ -1,13 +1,14 @@
-//! The drive on commands: goal, ground, paths and decision at every stop, and why it stopped.
+//! The commanded drive: goal, ground, paths and decision at every stop, and why it stopped.
 //!
-//! Beside the table of the module, in the site frame:
+//! Entities in addition to those in the module's table, in the site frame:
 //!
 //! - `/drive/set_goal/goal`, `Points3D`: the goal, with its tolerance as radius;
-//! - `/drive/map_hazards/ground`, `Mesh3D`: the known cells at their measured heights, in the colour of their goodness: from violet (bad) to
-//!   yellow (good), blue where the target exempts them, grey where they are assumed to be good;
-//! - `/drive/select_path/paths`, `LineStrips3D`: every path that was considered, vetoed ones vermilion, the others by their votes;
+//! - `/drive/map_hazards/ground`, `Mesh3D`: the known cells at their measured heights, coloured by goodness: from violet
+//!   (bad) to yellow (good), blue where the target exempts them, grey where they are assumed to be good;
+//! - `/drive/select_path/paths`, `LineStrips3D`: every candidate path, vetoed ones vermilion, the others coloured by their
+//!   votes;
 //! - `/drive/select_path/chosen`, `LineStrips3D`: the motion, from the pose estimate of the stop;
-//! - `/drive/select_path/way`, `LineStrips3D`: the way to the goal;
+//! - `/drive/select_path/way`, `LineStrips3D`: the planned path to the goal;
 //! - `/drive/decision`, `TextLog`: the motion, or why the drive ended.
 //!
 //! The driven path is `/rover/path`.
@@ -23,12 +24,12 @@ use sightline_rover::hazards::{CellBasis, GoodnessCell, GoodnessMap};
 use sightline_session::stop_cause::{StopExplanation, words};
 
 use super::Logged;
-use super::border::point_3d;
+use super::convert::point_3d;
 use super::palette::{CLEARED, FAILED, MEASUREMENT, PREDICTION, Rgb, TRACKING, color, of_score};
 
 /// Points along a path.
 const PATH_POINTS: u32 = 12;
-/// The ground is so far below the rover's origin, m (VICAR PigMER); paths are drawn a little above it.
+/// Height of the rover's origin above the ground, m (VICAR PigMER); paths are drawn slightly above the ground.
 const PATH_BELOW_M: f64 = 0.27;
 
 /// The drive of a session.
@@ -40,7 +41,7 @@ pub struct DriveLog {
     pub hazards: Vec<Arc<StopHazards>>,
     /// The tolerance of the goal, m.
     pub tolerance_m: f64,
-    /// Why it stopped; `None` while it goes on, and where it has arrived.
+    /// Why it stopped; `None` while it is in progress, and if it has arrived.
     pub why: Option<StopExplanation>,
 }
 
@@ -103,7 +104,7 @@ fn strip(points: Vec<[f32; 3]>, rgb: Rgb, width: f32) -> LineStrips3D {
     LineStrips3D::new([points]).with_colors([color(rgb)]).with_radii([Radius::new_ui_points(width)])
 }
 
-/// A motion from a pose, site frame, m.
+/// Points along a motion that starts at a pose, site frame, m.
 fn path(motion: &Motion, site_from_rover: &Pose) -> Vec<[f32; 3]> {
     let at = |k: u32| {
         let ([ahead, right], _) = motion.after(f64::from(k) / f64::from(PATH_POINTS));
@@ -112,7 +113,7 @@ fn path(motion: &Motion, site_from_rover: &Pose) -> Vec<[f32; 3]> {
     (0..=PATH_POINTS).map(at).collect()
 }
 
-/// The known cells as squares at their heights; `None` if no cell is known.
+/// The known cells as squares at their heights; `None` without known cells.
 fn mesh(map: &GoodnessMap) -> Option<Mesh3D> {
     let half_m = 0.5 * map.grid.cell_m;
     let (mut corners, mut colors, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
@@ -123,7 +124,7 @@ fn mesh(map: &GoodnessMap) -> Option<Mesh3D> {
         for [dx, dy] in [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]] {
             let corner = Point3::new(x + dx * half_m, y + dy * half_m, f64::from(height_m));
             corners.push(point_3d(&corner));
-            colors.push(color(looks(cell)));
+            colors.push(color(appearance(cell)));
         }
         triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
     }
@@ -131,7 +132,7 @@ fn mesh(map: &GoodnessMap) -> Option<Mesh3D> {
         .then(|| Mesh3D::new(corners).with_triangle_indices(triangles).with_vertex_colors(colors))
 }
 
-fn looks(cell: &GoodnessCell) -> Rgb {
+fn appearance(cell: &GoodnessCell) -> Rgb {
     match cell.basis {
         CellBasis::Exempt => MEASUREMENT,
         CellBasis::Assumed => CLEARED,

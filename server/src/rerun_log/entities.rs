@@ -1,5 +1,5 @@
-//! Every entity of a recording, in the order in which a step logs them: the table that the module's header
-//! prints and that a test compares with what is read back from a file.
+//! Every entity of a recording, in the order in which a step logs them. A test compares this table with the contents of a
+//! file; the module's header prints it.
 
 use sightline_session::records::StageQuantity;
 use sightline_session::step::RunStep;
@@ -9,31 +9,31 @@ use super::scores::{self, SCORES, Score};
 use super::shape;
 use super::step::path;
 
-/// How many rows an entity has.
+/// Number of rows of an entity.
 #[derive(Clone, Copy, Debug)]
 pub enum Rows {
-    /// One row outside of all time.
+    /// One static row.
     Once,
     /// One row for every stop of the traverse.
     EachStop,
-    /// One row for every step of the run: data where the condition holds and a `Clear` elsewhere. Entities that
-    /// all runs share have one row for every step that any of them has.
+    /// One row for every step of the run: data if the condition is met, else a `Clear`. Entities shared by all runs have one
+    /// row for every step of any run.
     EachStep {
-        /// When there are data, in words.
+        /// The condition for data, in words.
         when: &'static str,
         /// Whether this step has data.
         holds: fn(&RunStep) -> bool,
     },
-    /// The same, for a number.
+    /// As `EachStep`, with a number as data.
     EachScore {
-        /// When there is a number, in words.
+        /// The condition for a number, in words.
         when: &'static str,
         /// The number of this step.
         value: Number,
     },
 }
 
-/// Where the number of an entity is read.
+/// The source of an entity's number.
 #[derive(Clone, Copy, Debug)]
 pub struct Number(Reader);
 
@@ -52,16 +52,16 @@ impl Number {
     }
 }
 
-/// What is known about one entity of a recording.
+/// Description of one entity of a recording.
 #[derive(Clone, Debug)]
 pub struct EntityDoc {
     /// Its path.
     pub path: String,
     /// The archetype of its rows.
     pub archetype: &'static str,
-    /// The archetype that says, outside of all time, how the rows are drawn.
+    /// The archetype of the static row with the drawing style.
     pub style: Option<&'static str>,
-    /// How many rows it has.
+    /// Number of rows.
     pub rows: Rows,
 }
 
@@ -77,7 +77,7 @@ impl EntityDoc {
     }
 }
 
-/// The entities that all runs of a recording share.
+/// The entities shared by all runs of a recording.
 pub fn shared_entities() -> Vec<EntityDoc> {
     let doc =
         |path: &str, archetype, style, rows| EntityDoc { path: path.to_owned(), archetype, style, rows };
@@ -101,7 +101,7 @@ pub fn shared_entities() -> Vec<EntityDoc> {
     ]
 }
 
-/// The entities of the run that is called `root` in paths.
+/// The entities of the run with the path name `root`.
 pub fn entities_of(root: &str) -> Vec<EntityDoc> {
     let docs = EVIDENCE.iter().map(|&(entity, archetype, when, holds)| {
         let style = (archetype == "StateChange").then_some("StateConfiguration");
@@ -124,16 +124,16 @@ pub fn entities_of(root: &str) -> Vec<EntityDoc> {
     std::iter::once(label).chain(docs).chain(plotted).chain(declared).collect()
 }
 
-/// All entities of a recording with this many targets of one run each.
+/// All entities of a recording with `targets` targets of one run each.
 pub fn documented_entities(targets: usize) -> Vec<EntityDoc> {
     let own = (0..targets).flat_map(|target| entities_of(&super::root(target, 0)));
     shared_entities().into_iter().chain(own).collect()
 }
 
-/// Entity, archetype, when there are data, and the test for it.
+/// Entity, archetype, condition for data in words, and the condition itself.
 type Evidence = (&'static str, &'static str, &'static str, fn(&RunStep) -> bool);
 
-/// What is logged of a run beside its numbers, in the order of the stages.
+/// The entities of a run except for its numbers, in the order of the stages.
 #[rustfmt::skip]
 const EVIDENCE: &[Evidence] = &[
     ("/{target}/predict/position", "Points3D", "predicted", |t| t.prediction().is_some()),

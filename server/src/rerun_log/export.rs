@@ -1,4 +1,4 @@
-//! A recording as an `.rrd` file: written beside its place, then moved there whole.
+//! Writes a recording as an `.rrd` file: to a temporary file first, which is then renamed.
 
 use std::collections::BTreeSet;
 use std::io::BufWriter;
@@ -17,15 +17,15 @@ use super::drive::DriveLog;
 use super::memory::MemoryStream;
 use super::recorder::{Recorder, RunLog, builder};
 
-/// How many steps are gathered before they are written: rows of one entity then share a chunk.
+/// Number of steps per batch: rows of one entity then share a chunk.
 const STEPS_AT_ONCE: usize = 16;
 
 /// Size at which a chunk of one entity is closed, bytes.
 const CHUNK_BYTES: u64 = 4 << 20;
 
-/// Writes `runs` and a drive with their layout to `path`, a new file.
+/// Writes `runs` and a drive with their layout to the new file `path`.
 ///
-/// `progress` is told the steps done and the steps in all; when it breaks, nothing is left behind.
+/// `progress` receives the number of finished steps and their total; if it breaks, no file remains.
 ///
 /// # Errors
 /// [`Error::Cancelled`] when `progress` breaks; [`Error::Write`] when the file exists or cannot be written.
@@ -79,12 +79,12 @@ fn write(
     }
     file.append(&memory)?;
     let file = file.finish()?;
-    // Everything is written: a break now would come too late, so its answer does not matter.
+    // The file is complete, so a break has no effect.
     let _ = progress(all.len(), all.len());
     Ok(file)
 }
 
-/// An `.rrd` file in work. Rerun's own file sink reports a full disk only to its log, so we write ourselves.
+/// An `.rrd` file being written. Rerun's own file sink reports a full disk only in its log, so it is not used.
 struct RrdFile<'a> {
     path: &'a Path,
     encoder: Encoder<BufWriter<PartialFile>>,

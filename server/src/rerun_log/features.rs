@@ -1,22 +1,21 @@
-//! The steps of the feature tracker: what it found and matched, the motion's residuals, and the cloud of the bootstrap.
+//! The stages of the feature tracker: detected and matched features, the residuals of the motion, and the bootstrap cloud.
 //!
-//! Radii on the images are the features' scales in pixels of the image. A feature's point in space is on its left ray at
-//! its range. Residuals run from where the motion puts a feature to where it was found, [`MAGNIFICATION`] times as long
-//! as they are.
+//! Radii on the images are the features' scales, px. The 3-D point of a feature is on its left ray at its range. Residuals
+//! are drawn from the position predicted by the motion to the observed position, magnified by [`MAGNIFICATION`].
 
 use rerun::{Arrows2D, LineStrips2D, Points2D, Points3D, Radius};
 use sightline_geometry::frames::Pixel;
 use sightline_track::locate::features::rows::{self, CloudPoint, Feature, Matched};
 
 use super::Logged;
-use super::border::{point, point_3d, vector};
+use super::convert::{point, point_3d, vector};
 use super::palette::{INLIER, KEYPOINT, MEASUREMENT, OUTLIER, RESIDUAL, Rgb, color};
 use super::step::Step;
 
-/// How much longer than they are residuals are drawn.
+/// Magnification of drawn residuals.
 pub(super) const MAGNIFICATION: f64 = 10.0;
 
-/// The features of the left image, each as large as its scale.
+/// The features of the left image, with their scale as radius.
 pub(super) fn log_keypoints(step: &Step<'_>) -> Logged {
     let found = features(step).map(|all| {
         Points2D::new(all.iter().map(|feature| point(feature.pixel)))
@@ -27,7 +26,7 @@ pub(super) fn log_keypoints(step: &Step<'_>) -> Logged {
     step.log("/{target}/locate/detect/keypoints", found)
 }
 
-/// Their partners in the right image.
+/// Their matches in the right image.
 pub(super) fn log_partners(step: &Step<'_>) -> Logged {
     let found = features(step).map(|all| {
         Points2D::new(all.iter().filter_map(|feature| feature.right).map(point))
@@ -38,28 +37,28 @@ pub(super) fn log_partners(step: &Step<'_>) -> Logged {
     step.log("/{target}/locate/match_features/partners", found)
 }
 
-/// The points that both eyes see.
+/// The 3-D points of features with a range.
 pub(super) fn log_points(step: &Step<'_>) -> Logged {
     let camera = &step.trace.point_mast.left;
     let found = features(step).map(|all| {
-        let place = |feature: &Feature| Some(camera.ray(feature.pixel)?.at(feature.range_m?));
-        let points = all.iter().filter_map(place).map(|at| point_3d(&step.in_site(&at)));
+        let position_of = |feature: &Feature| Some(camera.ray(feature.pixel)?.at(feature.range_m?));
+        let points = all.iter().filter_map(position_of).map(|at| point_3d(&step.in_site(&at)));
         Points3D::new(points).with_radii([Radius::new_ui_points(1.5)]).with_colors([color(KEYPOINT)])
     });
     step.log("/{target}/locate/triangulate/points", found)
 }
 
-/// From where the inliers were in the earlier image to where they are.
+/// Arrows from the earlier to the current position of the inliers.
 pub(super) fn log_inliers(step: &Step<'_>) -> Logged {
     step.log("/{target}/locate/match_features/inliers", flow(step, true, INLIER))
 }
 
-/// From where the outliers were.
+/// The same arrows for the outliers.
 pub(super) fn log_outliers(step: &Step<'_>) -> Logged {
     step.log("/{target}/locate/match_features/outliers", flow(step, false, OUTLIER))
 }
 
-/// The inliers' residuals in the image.
+/// The image residuals of the inliers.
 pub(super) fn log_residuals(step: &Step<'_>) -> Logged {
     let arrow = |feature: &Feature, matched: &Matched| {
         Some((matched.moved?, matched.residual_px(feature.pixel)? * MAGNIFICATION))
@@ -75,7 +74,7 @@ pub(super) fn log_residuals(step: &Step<'_>) -> Logged {
     step.log("/{target}/locate/fit_motion/residuals", found)
 }
 
-/// Where the bootstrap puts the target, in space.
+/// The target positions of the bootstrap, in space.
 pub(super) fn log_cloud(step: &Step<'_>) -> Logged {
     let found = cloud(step).map(|all| {
         let points = all.iter().map(|at| point_3d(&step.in_site(&at.position_in_rover)));
@@ -84,7 +83,7 @@ pub(super) fn log_cloud(step: &Step<'_>) -> Logged {
     step.log("/{target}/locate/bootstrap/cloud", found)
 }
 
-/// The same in the left image.
+/// The target positions of the bootstrap, in the left image.
 pub(super) fn log_cloud_left(step: &Step<'_>) -> Logged {
     let found = cloud(step).map(|all| {
         Points2D::new(all.iter().filter_map(|at| at.left_pixel).map(point))
@@ -105,7 +104,7 @@ fn cloud(step: &Step<'_>) -> Option<Vec<CloudPoint>> {
     Some(rows::cloud(&evidence.cloud.get()?.values).collect())
 }
 
-/// The matches that agree with the motion, or those that do not.
+/// The matches that are inliers of the motion, or its outliers.
 fn matches(step: &Step<'_>, is_inlier: bool) -> Option<Vec<(Feature, Matched)>> {
     step.features()?.fit_motion.as_ref()?;
     let matched = |feature: Feature| feature.matched.clone().map(|matched| (feature, matched));

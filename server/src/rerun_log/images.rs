@@ -1,6 +1,6 @@
-//! Stage `capture` and all that is drawn over its two images.
+//! Stage `capture` and all overlays of its two images.
 //!
-//! Sizes in pixels are those of the image; pens are in screen points, so that a line is as thin at any zoom.
+//! Sizes in pixels are image pixels; line widths are screen points, independent of the zoom.
 
 use rerun::{Boxes2D, LineStrips2D, Radius, RecordingStream};
 use sightline_geometry::camera::CameraName;
@@ -10,24 +10,24 @@ use sightline_session::marks::{MarkName, Shape};
 use sightline_vision::image::{GrayImage, PixelRect};
 
 use super::Logged;
-use super::border::{corner_frame, dot, ellipse, haloed, outline, plus, png, point};
+use super::convert::{corner_frame, dot, ellipse, haloed, outline, plus, png, point};
 use super::palette::{MEASUREMENT, PREDICTION, Rgb, SECOND_PEAK, TRUTH, color, faint, of_score, of_state};
 use super::step::Step;
 
-/// Arm of the truth's plus sign, px.
+/// Half length of the strokes of the ground truth's plus sign, px.
 const PLUS_ARM_PX: f64 = 6.0;
 
-/// The left image of the pair in which the target is tracked.
+/// The left image of the pair used for tracking the target.
 pub(super) fn log_left_image(step: &Step<'_>) -> Logged {
     step.log(&of_camera(step.camera(), "left"), step.images.as_ref().and_then(|[left, _]| png(left)))
 }
 
-/// The right image of that pair.
+/// The right image of the pair used for tracking the target.
 pub(super) fn log_right_image(step: &Step<'_>) -> Logged {
     step.log(&of_camera(step.camera(), "right"), step.images.as_ref().and_then(|[_, right]| png(right)))
 }
 
-/// The images of a camera beside the main pair.
+/// The images of a further camera.
 pub(super) fn log_further(stream: &RecordingStream, name: CameraName, images: &FurtherImages) -> Logged {
     let log = |eye: &str, image: &GrayImage| match png(image) {
         Some(png) => stream.log(of_camera(Some(name), eye), &png),
@@ -37,7 +37,7 @@ pub(super) fn log_further(stream: &RecordingStream, name: CameraName, images: &F
     images.1.as_ref().map_or(Ok(()), |right| log("right", right))
 }
 
-/// The path of an image: of the main pair, or of a further camera.
+/// The entity path of an image of the main pair or of a further camera.
 pub(super) fn of_camera(camera: Option<CameraName>, eye: &str) -> String {
     camera.map_or_else(|| format!("/capture/{eye}"), |name| format!("/capture/{name}/{eye}"))
 }
@@ -69,12 +69,12 @@ pub(super) fn log_subframe(step: &Step<'_>) -> Logged {
     step.log("/{target}/capture/subframe", subframe.map(|rect| frame(&rect, TRUTH, "subframe")))
 }
 
-/// The frame of the subframe, from which the close-up looks.
+/// The frame of the subframe, which is the origin of the close-up.
 pub(super) fn log_subframe_frame(step: &Step<'_>) -> Logged {
     step.log("/{target}/capture/frame", rect(step, MarkName::Subframe).map(|rect| corner_frame(&rect)))
 }
 
-/// What the template's window became by scale and roll, where it is expected.
+/// The outline of the template's window after scale and roll, at its predicted position.
 pub(super) fn log_footprint(step: &Step<'_>) -> Logged {
     step.log("/{target}/locate/scale_roll/footprint", lines(step, MarkName::PredictedWindow, PREDICTION))
 }
@@ -85,25 +85,25 @@ pub(super) fn log_search_window(step: &Step<'_>) -> Logged {
     step.log("/{target}/locate/match_template/window", window)
 }
 
-/// The window that was compared with the template, in the colour of the state.
+/// The matched window, in the colour of the state.
 pub(super) fn log_matched_window(step: &Step<'_>) -> Logged {
     let rgb = of_state(step.trace.update.state);
     step.log("/{target}/locate/match_template/matched_window", lines(step, MarkName::MatchedWindow, rgb))
 }
 
-/// The match.
+/// The position of the match.
 pub(super) fn log_peak(step: &Step<'_>) -> Logged {
     let peak = at(step, MarkName::Peak).map(|pixel| dot(pixel, MEASUREMENT, step.label));
     step.log("/{target}/locate/match_template/peak", peak)
 }
 
-/// The next best match.
+/// The second peak.
 pub(super) fn log_second_peak(step: &Step<'_>) -> Logged {
     let second = at(step, MarkName::SecondPeak).map(|pixel| dot(pixel, SECOND_PEAK, "second peak"));
     step.log("/{target}/locate/match_template/second_peak", second)
 }
 
-/// The error of the located left position (R180).
+/// The error ellipses of the located left position (R180).
 pub(super) fn log_left_covariance(step: &Step<'_>) -> Logged {
     step.log("/{target}/locate/left_covariance", lines(step, MarkName::LocatedError, MEASUREMENT))
 }
@@ -132,7 +132,7 @@ pub(super) fn log_right_match(step: &Step<'_>) -> Logged {
     step.log("/{target}/locate/point_stereo/match", matched)
 }
 
-/// The truth in the left image.
+/// The ground truth in the left image.
 pub(super) fn log_true_left(step: &Step<'_>) -> Logged {
     let pixel = at(step, MarkName::TrueLeft);
     step.log("/truth/{target}/left", pixel.map(|pixel| haloed(&plus(pixel, PLUS_ARM_PX), TRUTH)))
@@ -154,7 +154,7 @@ fn rect(step: &Step<'_>, name: MarkName) -> Option<PixelRect> {
     }
 }
 
-/// The outlines of a mark; none where its covariance is not finite.
+/// The outlines of a mark; `None` if its covariance is not finite.
 fn lines(step: &Step<'_>, name: MarkName, rgb: Rgb) -> Option<LineStrips2D> {
     let strips = match step.mark(name)? {
         Shape::Outline(corners) => vec![outline(corners.iter().copied())],

@@ -1,17 +1,17 @@
-//! A layout of views in containers, and its rows in the store of a rerun blueprint.
+//! A layout of views in containers, and its rows in a rerun blueprint.
 //!
-//! Rerun's own builder is not used: it leaks a stream with its threads at every `Blueprint::send`, and it has no words for
-//! properties of views such as the corner of a legend. The rows are those that it writes:
+//! Rerun's own builder is not used: it leaks a stream with its threads at every `Blueprint::send`, and it does not support
+//! view properties such as the corner of a legend. The rows have the same form as its own:
 //!
 //! | path | archetype |
 //! |---|---|
 //! | `/viewport` | `ViewportBlueprint`: the root container |
-//! | `/container/{id}` | `ContainerBlueprint`: kind, paths of the parts, shares |
+//! | `/container/{id}` | `ContainerBlueprint`: kind, paths of the children, shares |
 //! | `/view/{id}` | `ViewBlueprint`: class, name, origin |
-//! | `/view/{id}/ViewContents` | `ViewContents`: which entities are shown |
+//! | `/view/{id}/ViewContents` | `ViewContents`: the visible entities |
 //! | `/view/{id}/{property}` | a property of the view |
 //!
-//! An id is a UUID that counts the parts of the layout: the store's own name is random.
+//! An id is a UUID with the index of the part in the layout; the name of the store is random.
 
 use rerun::blueprint::components::{
     AutoLayout, AutoViews, ColumnShare, ContainerKind, GridColumns, IncludedContent, QueryExpression,
@@ -28,19 +28,19 @@ use rerun::{AsComponents, RecordingStream, RecordingStreamBuilder, RecordingStre
 use super::Logged;
 use super::memory::MemoryStream;
 
-/// The timeline of layouts; their rows are at its zero.
+/// The timeline of blueprints; all rows are at its time 0.
 const TIMELINE: &str = "blueprint";
 
 /// A container or a view.
-pub(super) enum Part {
+pub(super) enum LayoutNode {
     Container(Container),
     View(View),
 }
 
-/// Parts side by side, one below the other, in a grid or in tabs.
+/// Parts arranged horizontally, vertically, in a grid or in tabs.
 pub(super) struct Container {
     kind: ContainerKind,
-    parts: Vec<Part>,
+    parts: Vec<LayoutNode>,
     name: Option<String>,
     shares: Vec<f32>,
     columns: Option<u32>,
@@ -55,38 +55,38 @@ pub(super) struct View {
     properties: Vec<(&'static str, Box<dyn AsComponents>)>,
 }
 
-impl From<Container> for Part {
+impl From<Container> for LayoutNode {
     fn from(container: Container) -> Self {
         Self::Container(container)
     }
 }
 
-impl From<View> for Part {
+impl From<View> for LayoutNode {
     fn from(view: View) -> Self {
         Self::View(view)
     }
 }
 
 impl Container {
-    /// Parts in a container of that kind.
-    pub(super) fn new(kind: ContainerKind, parts: impl IntoIterator<Item = Part>) -> Self {
+    /// A container of that kind.
+    pub(super) fn new(kind: ContainerKind, parts: impl IntoIterator<Item = LayoutNode>) -> Self {
         let parts = parts.into_iter().collect();
         Self { kind, parts, name: None, shares: Vec::new(), columns: None }
     }
 
-    /// The name on its tab.
+    /// Sets the name on its tab.
     pub(super) fn with_name(mut self, name: &str) -> Self {
         self.name = Some(name.to_owned());
         self
     }
 
-    /// Relative widths of parts side by side, or heights of parts one below the other.
+    /// Sets the relative widths of horizontal parts, or heights of vertical ones.
     pub(super) fn with_shares(mut self, shares: impl Into<Vec<f32>>) -> Self {
         self.shares = shares.into();
         self
     }
 
-    /// Number of columns of a grid.
+    /// Sets the number of columns of a grid.
     pub(super) const fn with_columns(mut self, columns: u32) -> Self {
         self.columns = Some(columns);
         self
@@ -104,20 +104,20 @@ impl View {
         Self { class, name: name.into(), origin: "/".to_owned(), contents, properties: Vec::new() }
     }
 
-    /// The entity in whose space things are shown; `$origin` in the contents.
+    /// Sets the entity whose space is shown; `$origin` in the contents.
     pub(super) fn with_origin(mut self, origin: impl Into<String>) -> Self {
         self.origin = origin.into();
         self
     }
 
-    /// A property by the name of its archetype.
+    /// Adds a property by the name of its archetype.
     pub(super) fn with_property(mut self, name: &'static str, property: impl AsComponents + 'static) -> Self {
         self.properties.push((name, Box::new(property)));
         self
     }
 }
 
-/// Sends a layout to a recording, and makes it the one that is shown; `panels` are further rows by their paths.
+/// Sends a layout to a recording and activates it; `panels` are further rows by their paths.
 pub(super) fn send(
     root: Container,
     panels: &[(&str, &dyn AsComponents)],
@@ -143,30 +143,30 @@ pub(super) fn send(
     let Some(blueprint_id) = messages.first().map(|message| message.store_id().clone()) else {
         return Ok(());
     };
-    // The command that shows the layout comes last, because a half loaded one would be mistaken for whole.
+    // The activation command must be last, because the viewer would take an incomplete layout for the whole.
     let show = BlueprintActivationCommand { blueprint_id, make_active: true, make_default: true };
     stream.send_blueprint(messages, show);
     Ok(())
 }
 
-/// Writes parts as rows, and counts them.
+/// Writes parts as rows and counts them.
 struct Writer<'a> {
     rows: &'a RecordingStream,
     parts: u64,
 }
 
 impl Writer<'_> {
-    /// Writes a part and those in it; its path and id.
-    fn part(&mut self, part: &Part) -> RecordingStreamResult<(String, Uuid)> {
+    /// Writes a part and its children; returns its path and id.
+    fn part(&mut self, part: &LayoutNode) -> RecordingStreamResult<(String, Uuid)> {
         self.parts += 1;
         let (text, id) = id(self.parts);
         let path = match part {
-            Part::Container(container) => {
+            LayoutNode::Container(container) => {
                 let path = format!("container/{text}");
                 self.container(&path, container)?;
                 path
             }
-            Part::View(view) => {
+            LayoutNode::View(view) => {
                 let path = format!("view/{text}");
                 self.view(&path, view)?;
                 path
@@ -210,7 +210,7 @@ impl Writer<'_> {
     }
 }
 
-/// The UUID of a number, as text and as bytes; version 4 and variant 1, as parsers want them.
+/// The UUID of a number, as text and as bytes; version 4 and variant 1, as parsers require.
 fn id(number: u64) -> (String, Uuid) {
     let bytes = ((0x4000_u128 << 64) | (0x8000_u128 << 48) | u128::from(number)).to_be_bytes();
     let text = format!("00000000-0000-4000-8000-{number:012x}");

@@ -1,7 +1,7 @@
-//! A live recording: the bytes of an `.rrd` file that is never complete, because it grows with its session.
+//! A live recording: the bytes of an `.rrd` file that grows with its session and is never complete.
 //!
-//! One value is made for each viewer, so that every viewer gets the whole recording, and nothing is kept for viewers
-//! that may come. Its memory is one batch of steps.
+//! Each viewer has its own value and gets the whole recording; nothing is stored for future viewers. The memory of a value
+//! is one batch of steps.
 
 use std::io::{self, Write};
 use std::sync::{Arc, Mutex};
@@ -19,7 +19,7 @@ use super::memory::MemoryStream;
 use super::recorder::{Recorder, RunLog, builder};
 use crate::jobs::lock;
 
-/// Steps of one batch: they bound its memory and the time until a viewer gets the first bytes.
+/// Steps of one batch, a bound on its memory and on the delay of the first bytes.
 const STEPS_AT_ONCE: usize = 4;
 
 /// A live recording for one viewer.
@@ -31,7 +31,7 @@ pub struct LiveRecording {
 }
 
 impl LiveRecording {
-    /// Begins a recording; nothing is logged yet.
+    /// Starts an empty recording.
     ///
     /// # Errors
     /// [`Error::Request`] when rerun cannot start its threads.
@@ -43,14 +43,14 @@ impl LiveRecording {
         let options = EncodingOptions::PROTOBUF_COMPRESSED;
         let encoder = Encoder::new_eager(CrateVersion::LOCAL, options, encoded.clone());
         let mut encoder = encoder.map_err(|error| refused(&error))?;
-        // A footer lists every chunk: of an endless recording the list would grow without end.
+        // The footer lists every chunk, so for an endless recording it would grow without bound.
         encoder.do_not_emit_footer();
         let recorder = Recorder::new(memory.stream().clone(), true);
         Ok(Self { memory, recorder, encoder, encoded })
     }
 
-    /// Logs the decisions of its drive and the next steps of the session that are not in the recording; returns their bytes, empty when the recording is
-    /// up to date.
+    /// Logs the decisions of the drive and the next steps of the session that are missing in the recording; returns their
+    /// bytes, or none if the recording is up to date.
     ///
     /// # Errors
     /// [`Error::Request`] when rerun cannot take the rows.
@@ -69,7 +69,7 @@ impl LiveRecording {
                     target: number,
                     run,
                     label: &target.label,
-                    // A row is logged once: that of a paused step follows when the step is whole.
+                    // A row is logged once, so a paused step is logged when it is complete.
                     steps: record.whole_steps(),
                 })
             })
@@ -93,7 +93,7 @@ impl LiveRecording {
     }
 }
 
-/// The bytes that the encoder has written since the last time.
+/// The bytes that the encoder has written since the last call of `take`.
 #[derive(Clone, Default)]
 struct Buffer(Arc<Mutex<Vec<u8>>>);
 

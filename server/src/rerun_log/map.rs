@@ -1,8 +1,8 @@
-//! The map: what is known of the rover and the target in the site frame.
+//! The map: rover and target in the site frame.
 //!
-//! Everything is placed by the *estimated* pose of the stop, the truth of the target included: its true
-//! position in the rover frame is carried to the site frame by the same pose as the estimate, so that the gap
-//! between the two is `err_m` and the drift of the site frame stays out of it.
+//! Everything is placed with the *estimated* pose of the stop, including the true target: its true position in the rover
+//! frame is transformed to the site frame with the same pose as the estimate. The gap between the two is therefore `err_m`,
+//! without the drift of the site frame.
 
 use nalgebra::Matrix3;
 use rerun::{LineStrips3D, Radius, RecordingStream, TransformAxes3D, ViewCoordinates};
@@ -10,7 +10,7 @@ use sightline_geometry::camera::Camera;
 use sightline_geometry::frames::{Pixel, Point3, Vector3};
 use sightline_rover::pipeline::Stops;
 
-use super::border::{dot_3d, point_3d, transform};
+use super::convert::{dot_3d, point_3d, transform};
 use super::palette::{MEASUREMENT, PREDICTION, ROVER, Rgb, TRUTH, color, of_state};
 use super::step::Step;
 use super::{Logged, shape};
@@ -21,19 +21,19 @@ const FRUSTUM_M: f64 = 0.8;
 /// Length of the drawn axes of the rover, m.
 const AXES_M: f32 = 0.5;
 
-/// Points along each edge of an image, so that a fisheye's pyramid has its curved base.
+/// Points along each image edge, so that the pyramid of a fisheye camera has its curved base.
 const EDGE_POINTS: u32 = 8;
 
-/// From where a map is first seen.
+/// Initial viewpoint of the map.
 pub(super) struct Outlook {
-    /// Where the eye is, in the site frame.
+    /// Position of the viewer's eye, site frame, m.
     pub(super) eye: Point3,
-    /// What it looks at, in the site frame.
+    /// Point in the centre of the view, site frame, m.
     pub(super) target: Point3,
 }
 
 impl Outlook {
-    /// From behind, above and beside the first stop, with way and target in the picture.
+    /// Behind, above and beside the first stop, with path and target in view.
     pub(super) fn over(stops: &dyn Stops, target_in_site: &Point3) -> Self {
         let start = Point3::from(stops.site_from_rover(0).translation.vector);
         let ahead = target_in_site - start;
@@ -50,7 +50,7 @@ pub(super) fn log_site_axes(stream: &RecordingStream) -> Logged {
     stream.log_static("/", &ViewCoordinates::FRD())
 }
 
-/// The way driven, by the estimated poses of all stops.
+/// The driven path: the estimated positions of all stops.
 pub(super) fn log_path(stream: &RecordingStream, stops: &dyn Stops) -> Logged {
     let strip =
         (0..stops.stop_count()).map(|step| point_3d(&stops.site_from_rover(step).translation.vector.into()));
@@ -60,7 +60,7 @@ pub(super) fn log_path(stream: &RecordingStream, stops: &dyn Stops) -> Logged {
     stream.log_static("/rover/path", &line)
 }
 
-/// The rover's estimated pose; its axes are drawn the same at every stop.
+/// The rover's estimated pose, with axes of constant length.
 pub(super) fn log_pose(stream: &RecordingStream, stops: &dyn Stops, step: usize) -> Logged {
     if step == 0 {
         stream.log_static("/rover/pose", &TransformAxes3D::new(AXES_M))?;
@@ -78,7 +78,7 @@ pub(super) fn log_right_frustum(stream: &RecordingStream, stops: &dyn Stops, ste
     stream.log("/rover/pose/right", &frustum(stops.cameras(step).1, ROVER))
 }
 
-/// The pyramids of the cameras beside the main pair, in the rover frame.
+/// The pyramids of the further cameras, in the rover frame.
 pub(super) fn log_further_frusta(stream: &RecordingStream, stops: &dyn Stops, step: usize) -> Logged {
     stops.further_cameras(step).iter().try_for_each(|camera| {
         let path = |eye: &str| format!("/rover/pose/{}/{eye}", camera.name);
@@ -100,33 +100,33 @@ pub(super) fn log_predicted_covariance(step: &Step<'_>) -> Logged {
     step.log("/{target}/predict/covariance", found)
 }
 
-/// The position from both pixels, accepted or not.
+/// The triangulated position, accepted or not.
 pub(super) fn log_triangulated_position(step: &Step<'_>) -> Logged {
     let found = step.template().and_then(|e| e.triangulate.as_ref());
     let point = found.map(|t| dot_3d(step.in_site(&t.position_in_rover), MEASUREMENT, "triangulated"));
     step.log("/{target}/locate/triangulate/position", point)
 }
 
-/// The covariance of that position.
+/// The covariance of the triangulated position.
 pub(super) fn log_triangulated_covariance(step: &Step<'_>) -> Logged {
     let found = step.template().and_then(|e| e.triangulate.as_ref());
     let found = found.and_then(|t| step.spread(&t.position_in_rover, &t.covariance_in_rover, MEASUREMENT));
     step.log("/{target}/locate/triangulate/covariance", found)
 }
 
-/// The position by the motion of the scene, accepted or not.
+/// The position transformed by the motion of the scene, accepted or not.
 pub(super) fn log_moved_position(step: &Step<'_>) -> Logged {
     let point = moved(step).map(|(at, _)| dot_3d(step.in_site(&at), MEASUREMENT, "moved"));
     step.log("/{target}/locate/bootstrap/position", point)
 }
 
-/// The covariance of that position.
+/// The covariance of the position transformed by the motion.
 pub(super) fn log_moved_covariance(step: &Step<'_>) -> Logged {
     let found = moved(step).and_then(|(at, covariance)| step.spread(&at, &covariance, MEASUREMENT));
     step.log("/{target}/locate/bootstrap/covariance", found)
 }
 
-/// Position and covariance of a target that the motion moved, in the rover frame.
+/// Position and covariance of a target transformed by the motion, rover frame.
 fn moved(step: &Step<'_>) -> Option<(Point3, Matrix3<f64>)> {
     let located = step.features()?.bootstrap.as_ref().and(step.trace.located())?;
     if shape::registered(step.trace).is_some() {
@@ -135,7 +135,7 @@ fn moved(step: &Step<'_>) -> Option<(Point3, Matrix3<f64>)> {
     located.position_in_rover.zip(located.covariance_in_rover)
 }
 
-/// The target as the step leaves it, in the colour of its state.
+/// The target after the step's update, in the colour of its state.
 pub(super) fn log_position(step: &Step<'_>) -> Logged {
     let updated = &step.trace.update;
     let position = step.in_site(&updated.target.position_in_rover);
@@ -150,7 +150,7 @@ pub(super) fn log_true_position(step: &Step<'_>) -> Logged {
     step.log("/truth/{target}/position", point)
 }
 
-/// The pyramid that an image's border sees, by the camera's true rays and not by a pinhole.
+/// The viewing pyramid of an image, along the camera's true rays instead of those of a pinhole.
 fn frustum(camera: &Camera, rgb: Rgb) -> LineStrips3D {
     let (w, h) = (f64::from(camera.width()), f64::from(camera.height()));
     let corners = [(0.0, 0.0), (w, 0.0), (w, h), (0.0, h)];

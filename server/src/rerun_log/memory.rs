@@ -1,29 +1,29 @@
-//! A recording that is gathered in memory: for the export, which writes it to a file, and for the rows of a layout.
+//! A recording in memory: for the export, which writes it to a file, and for the rows of a layout.
 //!
-//! Rerun's memory sink owns the stream that owns it (`MemorySinkStorage::rec` in re_sdk 0.36), so that neither would
-//! be freed, nor their eight threads. The stream is therefore disconnected from its sink when it is dropped.
+//! Rerun's memory sink and its stream own each other (`MemorySinkStorage::rec` in re_sdk 0.36), so neither would be freed,
+//! nor their eight threads. The stream is therefore disconnected from its sink when dropped.
 
 use rerun::log::LogMsg;
 use rerun::sink::MemorySinkStorage;
 use rerun::{RecordingStream, RecordingStreamBuilder, RecordingStreamResult};
 
-/// A stream with the messages that were logged to it.
+/// A stream with its logged messages.
 pub(super) struct MemoryStream {
     stream: RecordingStream,
     gathered: MemorySinkStorage,
 }
 
 impl MemoryStream {
-    /// Opens the stream that `builder` describes.
+    /// Opens the stream described by `builder`.
     ///
     /// # Errors
-    /// A system that starts no thread.
+    /// The system cannot start a thread.
     pub(super) fn open(builder: RecordingStreamBuilder) -> RecordingStreamResult<Self> {
         let (stream, gathered) = builder.memory()?;
         Ok(Self { stream, gathered })
     }
 
-    /// The stream to log to. A clone must not outlive this value: its messages would go nowhere.
+    /// The stream to log to. A clone must not outlive this value: its messages would be lost.
     pub(super) const fn stream(&self) -> &RecordingStream {
         &self.stream
     }
@@ -36,7 +36,7 @@ impl MemoryStream {
 
 impl Drop for MemoryStream {
     fn drop(&mut self) {
-        // Messages of an export that failed; the new sink would take them over.
+        // Discards the messages of a failed export, which the new sink would receive.
         drop(self.gathered.take());
         self.stream.disconnect();
     }

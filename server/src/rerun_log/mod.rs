@@ -1,22 +1,22 @@
-//! The Rerun side of the debugger: runs as an `.rrd` file ([`export`]) or as a live recording ([`LiveRecording`]).
+//! Rerun recordings of runs, as an `.rrd` file ([`export`]) or live ([`LiveRecording`]).
 //!
-//! Every entity has one `log_*` function, called in the order of the stages from `log_step`; the numbers are
-//! one table in `scores`. `{target}` is the run's name: `target_1` for the first run of the first target,
-//! `target_1_run_1` for the first run that was forked from it.
+//! Every entity has one `log_*` function, which `log_step` calls in the order of the stages; the numbers are one table in
+//! `scores`. `{target}` is the run's path name: `target_1` for the first run of the first target, `target_1_run_1` for the
+//! first run forked from it.
 //!
 //! Timelines: `step`, the stop from 0, and `time`, the time since the first stop. Rows carry no clock time.
 //!
-//! **Pixels.** Ours has (0, 0) at the centre of the first pixel, rerun's 2-D space at that pixel's top left
-//! corner: half a pixel is added in `border` and nowhere else. **Frames.** Space is the site frame (x north, y
-//! east, z down), declared once at the root; what lies below `/rover/pose` is in the rover frame.
+//! **Pixels.** In Sightline, (0, 0) is the centre of the first pixel, in rerun's 2-D space its top left corner: only
+//! `convert` adds the half pixel. **Frames.** Space is the site frame (x north, y east, z down), declared once at the root;
+//! entities below `/rover/pose` are in the rover frame.
 //!
-//! **Every step has a row.** Where a stage was not reached, its entities get a `Clear`, because a viewer would
-//! go on showing the last step's; a number that is missing is a gap of its line.
+//! **Every step has a row.** If a stage was not reached, its entities get a `Clear`, because a viewer would continue to show
+//! the last step's data; a missing number is a gap in its line.
 //!
 //! **Further cameras** have the same entities as the main pair below their names: `/rover/pose/{camera}/left` and `right` at
-//! every stop that has the camera, `/capture/{camera}/left` and `right` where a target is tracked in it, and at the other
-//! stops with a step where its images are there without being rendered. A run in such a pair is drawn over its images, and so
-//! are the corners of odometry: `/capture/{camera}/left/odometry/{before, after, flow}`.
+//! every stop that has the camera; `/capture/{camera}/left` and `right` at stops where a target is tracked in it, and at
+//! other stops with a step if the images already exist. Overlays of a run in such a pair, and the corners of odometry, are
+//! below the pair's images: `/capture/{camera}/left/odometry/{before, after, flow}`.
 //!
 //! | path | archetype | when |
 //! |---|---|---|
@@ -128,12 +128,12 @@
 //! | `/truth/{target}/err_m` | `Scalars`, static `SeriesLines` | the truth is known |
 //! | `/truth/{target}/nees` | `Scalars`, static `SeriesLines` | the truth is known and there is a covariance |
 //!
-//! A drive on commands has `/drive/…` beside these, one row for each decision (`drive`).
+//! A commanded drive also has `/drive/…`, one row for each decision (`drive`).
 //!
-//! Beside these, `/{target}/record/{stage}/{quantity}` has every number that a stage declares, as `Scalars`.
+//! In addition, `/{target}/record/{stage}/{quantity}` contains every number declared by a stage, as `Scalars`.
 
 mod blueprint;
-mod border;
+mod convert;
 mod drive;
 mod entities;
 mod export;
@@ -152,7 +152,7 @@ mod scores;
 mod shape;
 mod states;
 mod step;
-mod surface;
+mod score_map;
 mod templates;
 
 use rerun::{RecordingStream, RecordingStreamResult};
@@ -168,10 +168,10 @@ pub use recorder::RunLog;
 use scores::SCORES;
 use step::Step;
 
-/// Whether a row could be handed to rerun.
+/// The result of passing a row to rerun.
 type Logged = RecordingStreamResult<()>;
 
-/// The name of a run in entity paths; both numbers count from 0.
+/// The name of a run in entity paths; both indices start at 0.
 pub fn root(target: usize, run: usize) -> String {
     match run {
         0 => format!("target_{}", target + 1),
@@ -179,7 +179,7 @@ pub fn root(target: usize, run: usize) -> String {
     }
 }
 
-/// Logs what a stop is, whichever runs come by.
+/// Logs the data of a stop that are independent of runs.
 fn log_stop(stream: &RecordingStream, stops: &dyn Stops, step: usize) -> Logged {
     map::log_pose(stream, stops, step)?;
     map::log_left_frustum(stream, stops, step)?;
@@ -187,7 +187,7 @@ fn log_stop(stream: &RecordingStream, stops: &dyn Stops, step: usize) -> Logged 
     map::log_further_frusta(stream, stops, step)
 }
 
-/// Logs the odometry of a stop, whichever runs come by, over the pair in which it was measured.
+/// Logs the odometry of a stop, independent of runs, over the pair that measured it.
 fn log_odometry(stream: &RecordingStream, stops: &dyn Stops, trace: &RunStep) -> Logged {
     let corners = odometry::corners(stops, trace);
     let camera = trace.odometry.as_ref().and_then(|measured| measured.camera);
@@ -198,7 +198,7 @@ fn log_odometry(stream: &RecordingStream, stops: &dyn Stops, trace: &RunStep) ->
         .try_for_each(|known| odometry::log(stream, known, corners.as_deref().filter(|_| known == camera)))
 }
 
-/// Logs one step of a run, stage by stage; the images only where it is the first run of its pair at this stop.
+/// Logs one step of a run, stage by stage; the images only for the first run of its pair at this stop.
 fn log_step(step: &Step<'_>, is_first_here: bool) -> Logged {
     map::log_predicted_position(step)?;
     map::log_predicted_covariance(step)?;
@@ -219,9 +219,9 @@ fn log_step(step: &Step<'_>, is_first_here: bool) -> Logged {
     templates::log_scaled(step)?;
     templates::log_rolled(step)?;
     images::log_search_window(step)?;
-    surface::log_surface(step)?;
-    surface::log_surface_peak(step)?;
-    surface::log_surface_second_peak(step)?;
+    score_map::log_score_map(step)?;
+    score_map::log_score_map_peak(step)?;
+    score_map::log_score_map_second_peak(step)?;
     images::log_peak(step)?;
     images::log_second_peak(step)?;
     images::log_matched_window(step)?;
@@ -257,7 +257,7 @@ fn log_step(step: &Step<'_>, is_first_here: bool) -> Logged {
     scores::log_declared(step)
 }
 
-/// Logs the steps of the shape tracker.
+/// Logs the stages of the shape tracker.
 fn log_shape(step: &Step<'_>) -> Logged {
     shape::log_disparities(step)?;
     shape::log_ranges(step)?;
@@ -294,7 +294,7 @@ mod tests {
     #[test]
     fn the_table_of_this_file_lists_every_entity() {
         let own = entities_of("{target}");
-        // The numbers that stages declare are one rule, below the table.
+        // One rule below the table describes the numbers declared by stages.
         let own = own.iter().filter(|doc| !doc.path.contains("/record/"));
         let shared = shared_entities();
         let rows: Vec<_> = shared.iter().chain(own).map(table_row).collect();
@@ -307,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn runs_are_told_apart_by_their_names() {
+    fn runs_are_distinguished_by_their_names() {
         assert_eq!(root(0, 0), "target_1");
         assert_eq!(root(2, 1), "target_3_run_1");
     }

@@ -1,8 +1,8 @@
-//! The corners of visual odometry over the left image of a stop, by their fates. No step contains them: the update is
-//! computed again for the recording.
+//! The corners of visual odometry over the left image of a stop, coloured by fate. Steps do not contain them: the update is
+//! recomputed for the recording.
 //!
-//! Corners `before` are where they are in the left image of the stop before; `after` has the matches in that of the stop, and
-//! `flow` a line from one to the other. They are below the left image of the pair in which the motion was measured.
+//! `before` contains the corners in the left image of the previous stop, `after` their matches in that of the current stop,
+//! and `flow` a line from one to the other. They are below the left image of the pair that measured the motion.
 
 use std::collections::BTreeSet;
 
@@ -15,24 +15,24 @@ use sightline_rover::visual_odometry::{Fate, OdometryCorner};
 use sightline_session::step::RunStep;
 
 use super::Logged;
-use super::border::point;
+use super::convert::point;
 use super::images::of_camera;
 use super::palette::{INLIER, KEYPOINT, LOST, OUTLIER, PREDICTION, RESIDUAL, Rgb, SECOND_PEAK, color};
 
-/// The pairs in which motions were measured.
+/// The pairs that measured motions.
 pub(super) fn cameras(stops: &dyn Stops) -> BTreeSet<Option<CameraName>> {
     let measured = (0..stops.stop_count()).filter_map(|step| stops.measured_motion(step));
     measured.map(|measured| measured.camera).collect()
 }
 
-/// The corners of the update behind a step; `None` where there is none, or where its images cannot be read.
+/// The corners of a step's odometry update; `None` without one, or if its images cannot be read.
 pub(super) fn corners(stops: &dyn Stops, trace: &RunStep) -> Option<Vec<OdometryCorner>> {
     let measured = trace.odometry.as_deref()?;
     Some(measured.again(stops, trace.step, Cancel::default()).ok()?.table)
 }
 
-/// Logs the corners over the left image of a pair, or that there are none: those of the stop before, their matches, and lines
-/// from one to the other.
+/// Logs the corners over the left image of a pair: those of the previous stop, their matches, and lines between them.
+/// Without corners, clears the entities.
 pub(super) fn log(
     stream: &RecordingStream,
     camera: Option<CameraName>,
@@ -63,7 +63,7 @@ fn log_part<A: AsComponents>(
 fn flow(corners: &[OdometryCorner]) -> LineStrips2D {
     let line = |corner: &OdometryCorner| {
         let strip = [corner.before_px, corner.after_px?].map(at);
-        Some((strip, color(looks(corner.fate).0)))
+        Some((strip, color(appearance(corner.fate).0)))
     };
     let (strips, colors): (Vec<_>, Vec<_>) = corners.iter().filter_map(line).unzip();
     LineStrips2D::new(strips)
@@ -72,10 +72,10 @@ fn flow(corners: &[OdometryCorner]) -> LineStrips2D {
         .with_draw_order(21.0)
 }
 
-fn points(places: Vec<([f64; 2], Fate)>) -> Points2D {
-    Points2D::new(places.iter().map(|(place, _)| at(*place)))
-        .with_colors(places.iter().map(|(_, fate)| color(looks(*fate).0)))
-        .with_labels(places.iter().map(|(_, fate)| looks(*fate).1))
+fn points(corners: Vec<([f64; 2], Fate)>) -> Points2D {
+    Points2D::new(corners.iter().map(|(position, _)| at(*position)))
+        .with_colors(corners.iter().map(|(_, fate)| color(appearance(*fate).0)))
+        .with_labels(corners.iter().map(|(_, fate)| appearance(*fate).1))
         .with_show_labels(false)
         .with_radii([Radius::new_ui_points(2.0)])
         .with_draw_order(22.0)
@@ -85,8 +85,8 @@ fn at([x, y]: [f64; 2]) -> [f32; 2] {
     point(Pixel::new(x, y))
 }
 
-/// The colour and the word of a fate.
-const fn looks(fate: Fate) -> (Rgb, &'static str) {
+/// The colour and label of a fate.
+const fn appearance(fate: Fate) -> (Rgb, &'static str) {
     match fate {
         Fate::Inlier => (INLIER, "inlier"),
         Fate::Outlier => (OUTLIER, "outlier"),

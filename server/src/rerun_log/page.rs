@@ -1,9 +1,9 @@
-//! The files of rerun's own viewer, served by us.
+//! The files of rerun's own web viewer, served by this server.
 //!
-//! The viewer that rerun bundles reports its use to rerun.io and fetches fonts and examples from the network, with no
-//! switch to turn that off. Our content security policy lets the page load and call its own origin only, and run only the
-//! scripts that it arrives with, by their digests. It opens the live recording of the session named in its address, and
-//! no other address.
+//! The viewer bundled with rerun reports its use to rerun.io and fetches fonts and examples from the network, and has no
+//! switch to disable this. Our content security policy restricts the page to its own origin and to its original scripts,
+//! identified by their digests. The page opens the live recording of the session named in its address, and no other
+//! recording.
 
 use std::sync::LazyLock;
 
@@ -14,16 +14,16 @@ use base64::engine::general_purpose::STANDARD;
 use re_web_viewer_server::{WebViewerData, WebViewerDataError};
 use sha2::{Digest, Sha256};
 
-/// The page, a name of [`file`].
+/// The page, a name for [`file`].
 pub(crate) const PAGE: &str = "index.html";
 
-/// Which recording rerun's page opens: as many as its address names, from any host.
+/// The line in rerun's page that opens any recordings named in its address, from any host.
 const ANY_RECORDING: &str = r#"url: query.getAll("url"),"#;
 
-/// Which recording ours opens.
+/// The replacement, which opens the recording of the session.
 const OUR_RECORDING: &str = r#"url: [new URL(`../sessions/${encodeURIComponent(query.get("session"))}/rerun/live.rrd`, location.href).href],"#;
 
-/// Rerun's viewer sends no cookies with what it fetches, so that the server would refuse it.
+/// Rerun's viewer sends no cookies with its requests, so the server would reject them.
 const WITH_COOKIE: &str = r#"<script>
 const fetchWithoutCookie = window.fetch;
 window.fetch = (request, options) => fetchWithoutCookie(request, { ...options, credentials: "same-origin" });
@@ -45,10 +45,10 @@ static FILES: LazyLock<Result<Files, WebViewerDataError>> = LazyLock::new(|| {
     Ok(Files { data, page, policy })
 });
 
-/// A file of the viewer; `None` for another name.
+/// A file of the viewer; `None` for an unknown name.
 ///
 /// # Errors
-/// A viewer that is not part of the program.
+/// The program was built without the viewer.
 pub(crate) fn file(name: &str) -> Result<Option<Response>, &'static WebViewerDataError> {
     let files = FILES.as_ref()?;
     let data = &files.data;
@@ -64,12 +64,12 @@ pub(crate) fn file(name: &str) -> Result<Option<Response>, &'static WebViewerDat
         "re_viewer_bg.wasm" => ("application/wasm", data.viewer_wasm()),
         _ => return Ok(None),
     };
-    // The files change with the program only; the largest has 40 MB.
+    // The files change only with the program; the largest has 40 MB.
     let headers = [(CONTENT_TYPE, kind), (CACHE_CONTROL, "private, max-age=3600")];
     Ok(Some((headers, bytes.to_vec()).into_response()))
 }
 
-/// What the page may load and whom it may call.
+/// The content security policy of the page.
 fn policy(page: &str) -> String {
     let scripts: Vec<_> =
         inline_scripts(page).map(|script| format!(" 'sha256-{}'", digest(script))).collect();
@@ -88,7 +88,7 @@ fn policy(page: &str) -> String {
     .join("; ")
 }
 
-/// The contents of the scripts that are part of the page.
+/// The contents of the inline scripts of the page.
 fn inline_scripts(page: &str) -> impl Iterator<Item = &str> {
     page.split("<script>").skip(1).filter_map(|rest| rest.split("</script>").next())
 }
@@ -97,7 +97,7 @@ fn digest(script: &str) -> String {
     STANDARD.encode(Sha256::digest(script.as_bytes()))
 }
 
-/// The page without its links to other hosts, which the policy would refuse and the console would report.
+/// Removes links to other hosts from the page; the policy would block them and the console would report errors.
 fn without_foreign_links(html: &str) -> String {
     let mut parts = html.split("<link");
     let mut page = parts.next().unwrap_or_default().to_owned();

@@ -1,4 +1,4 @@
-//! The colours of the debugger (Okabe and Ito's, which readers with any colour vision can tell apart).
+//! The colours of the debugger: the palette of Okabe and Ito, distinguishable with any colour vision.
 //!
 //! | meaning | colour |
 //! |---|---|
@@ -37,12 +37,12 @@ pub(super) const ROVER: Rgb = [0xBB, 0xBB, 0xBB];
 pub(super) const LIMIT: Rgb = [0x88, 0x88, 0x88];
 pub(super) const MAP_BACKGROUND: Rgb = [0x18, 0x1A, 0x1C];
 
-/// The colour as rerun takes it, opaque.
+/// The colour as a rerun component, opaque.
 pub(super) fn color([r, g, b]: Rgb) -> Color {
     Color::from_rgb(r, g, b)
 }
 
-/// The colour as rerun takes it, with an opacity from 0 to 255.
+/// The colour as a rerun component, with an opacity from 0 to 255.
 pub(super) fn faint([r, g, b]: Rgb, opacity: u8) -> Color {
     Color::from_unmultiplied_rgba(r, g, b, opacity)
 }
@@ -70,11 +70,11 @@ const VIRIDIS: [Rgb; 9] = [
     [253, 231, 37],
 ];
 
-/// The colour of a score from −1 to 1, by the map and limits of the surface.
+/// The colour of a score from −1 to 1, with the colour map and limits of the score map.
 pub(super) fn of_score(score: f32) -> Rgb {
-    let place = (score.clamp(-1.0, 1.0) + 1.0) / 2.0 * (VIRIDIS.len() - 1) as f32;
-    let first = (place as usize).min(VIRIDIS.len() - 2);
-    mix(VIRIDIS[first], VIRIDIS[first + 1], place - first as f32)
+    let position = (score.clamp(-1.0, 1.0) + 1.0) / 2.0 * (VIRIDIS.len() - 1) as f32;
+    let first = (position as usize).min(VIRIDIS.len() - 2);
+    mix(VIRIDIS[first], VIRIDIS[first + 1], position - first as f32)
 }
 
 /// The colour of a signed value from −1 to 1: blue, white at zero, red.

@@ -1,4 +1,4 @@
-//! What a viewer shows as the properties of a recording: what made it, and from what.
+//! The properties of a recording in the viewer: its program, settings and source.
 
 use rerun::components::Text;
 use rerun::{AnyValues, RecordingStream};
@@ -7,7 +7,7 @@ use sightline_rover::version::tracker_version;
 use super::Logged;
 use crate::version::VERSION;
 
-/// The version of Rerun for which recordings are written.
+/// The version of Rerun to which recordings conform.
 const RERUN_VERSION: &str = "0.36";
 
 /// Sends the properties.

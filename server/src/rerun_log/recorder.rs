@@ -1,5 +1,5 @@
-//! Which rows are still to be logged: a recording takes every step of every run once, in whatever order they
-//! come, and the images of a stop once for all runs.
+//! Tracks which rows are in a recording: every step of every run is logged once, in any order, and the images of a stop once
+//! for all runs.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -25,21 +25,21 @@ use super::{
     Logged, blueprint, log_odometry, log_step, log_stop, map, odometry, properties, root, scores, states,
 };
 
-/// One run: which it is, and its steps.
+/// One run with its steps.
 #[derive(Clone, Copy, Debug)]
 pub struct RunLog<'a> {
-    /// The target's number, from 0.
+    /// The target's index, from 0.
     pub target: usize,
-    /// The run's number within the target, from 0.
+    /// The run's index within the target, from 0.
     pub run: usize,
-    /// What the person calls the target.
+    /// The user's label of the target.
     pub label: &'a str,
     /// Its steps so far.
     pub steps: &'a [Arc<RunStep>],
 }
 
 impl RunLog<'_> {
-    /// What the run is called in the recording: its target's label, with the number of a forked run.
+    /// The title of the run in the recording: its target's label, with the index of a forked run.
     fn title(&self) -> String {
         if self.run == 0 { self.label.to_owned() } else { format!("{}, run {}", self.label, self.run) }
     }
@@ -50,35 +50,35 @@ pub(super) struct Recorder {
     stream: RecordingStream,
     /// Whether a viewer should follow the newest step.
     live: bool,
-    /// Stops of the traverse that are in the recording; a drive on commands gains more.
+    /// Number of stops in the recording; grows with a commanded drive.
     stop_count: usize,
     /// Stops and cameras whose images are in the recording.
     captured: BTreeSet<(usize, Option<CameraName>)>,
     /// Steps whose odometry is in the recording.
     measured: BTreeSet<usize>,
-    /// The pairs whose odometry the layout shows.
+    /// The pairs with odometry in the layout.
     odometry: BTreeSet<Option<CameraName>>,
     /// Stops whose decision is in the recording.
     decided: BTreeSet<usize>,
-    /// The runs by their names in paths.
-    runs: BTreeMap<String, Known>,
+    /// The runs by path name.
+    runs: BTreeMap<String, LoggedRun>,
 }
 
-/// A run that was made known.
-struct Known {
+/// A run that is part of the recording.
+struct LoggedRun {
     /// The steps that are in the recording.
     steps: BTreeSet<usize>,
-    /// Where the target was designated, in the site frame.
+    /// Position of the designated target, site frame, m.
     position_in_site: Point3,
     /// Width and height of the subframe, px.
     close_up_px: [u32; 2],
-    /// Whether its tracker asks for the shape.
+    /// Whether it uses the shape tracker.
     has_shape: bool,
-    /// The pair in which its target is tracked.
+    /// The pair used for tracking its target; `None` for the main pair.
     camera: Option<CameraName>,
 }
 
-impl Known {
+impl LoggedRun {
     fn new(first: &RunStep) -> Self {
         let subframe = first.capture().and_then(|capture| capture.subframe);
         Self {
@@ -91,7 +91,8 @@ impl Known {
     }
 }
 
-/// What every recording of ours begins with. The environment cannot switch it off: a person asked for it.
+/// Starts the builder of a recording. Always enabled, regardless of rerun's environment variables, because the user
+/// requested the recording.
 ///
 /// # Errors
 /// As [`check_clock`].
@@ -100,19 +101,19 @@ pub(super) fn builder(name: &str) -> Result<RecordingStreamBuilder> {
     Ok(RecordingStreamBuilder::new("sightline").recording_name(name).enabled(true))
 }
 
-/// Refuses a clock before 1970, at which rerun panics: a recording holds the time at which it was made.
+/// Rejects a clock before 1970, at which rerun panics: a recording contains its creation time.
 ///
 /// # Errors
 /// [`Error::Request`].
 fn check_clock(now: SystemTime) -> Result<()> {
-    let is_held = now.duration_since(SystemTime::UNIX_EPOCH).is_ok();
+    let is_valid = now.duration_since(SystemTime::UNIX_EPOCH).is_ok();
     let problem =
         "the clock of this computer is before 1970, which a rerun recording cannot hold: set the clock";
-    is_held.then_some(()).ok_or_else(|| Error::Request(problem.to_owned()))
+    is_valid.then_some(()).ok_or_else(|| Error::Request(problem.to_owned()))
 }
 
 impl Recorder {
-    /// A recording into `stream`; its rows carry no clock time, only the step and the traverse's own time.
+    /// A recording into `stream`; its rows have no wall-clock time, only the step and the traverse's own time.
     pub(super) fn new(stream: RecordingStream, live: bool) -> Self {
         stream.set_log_time_enabled(false);
         Self {
@@ -127,7 +128,7 @@ impl Recorder {
         }
     }
 
-    /// Logs what does not depend on any run: all of it the first time, later the stops that are new.
+    /// Logs the data that are independent of runs: everything on the first call, then new stops only.
     pub(super) fn log_traverse(&mut self, name: &str, stops: &dyn Stops) -> Logged {
         let count = stops.stop_count();
         let before = std::mem::replace(&mut self.stop_count, count);
@@ -148,7 +149,7 @@ impl Recorder {
         })
     }
 
-    /// Logs the decisions of a drive that are new.
+    /// Logs the new decisions of a drive.
     pub(super) fn log_drive(&mut self, drive: &DriveLog, stops: &dyn Stops) -> Logged {
         for cycle in &drive.cycles {
             if self.decided.insert(cycle.step) {
@@ -159,7 +160,7 @@ impl Recorder {
         Ok(())
     }
 
-    /// Makes runs known, so that a viewer lays them out; those already known cost nothing.
+    /// Adds new runs to the recording and its layout.
     pub(super) fn log_runs(&mut self, runs: &[RunLog<'_>], stops: &dyn Stops) -> Logged {
         let known = self.runs.len();
         for run in runs {
@@ -168,7 +169,7 @@ impl Recorder {
             states::log_run(&self.stream, &root, &run.title(), first)?;
             states::log_styles(&self.stream, &root)?;
             scores::log_styles(&self.stream, &root)?;
-            self.runs.insert(root, Known::new(first));
+            self.runs.insert(root, LoggedRun::new(first));
         }
         let odometry = odometry::cameras(stops);
         if self.runs.len() == known && self.odometry == odometry {
@@ -187,7 +188,7 @@ impl Recorder {
         blueprint::send(&self.stream, &lanes, &outlook, (&self.odometry, self.live))
     }
 
-    /// Logs one step of a run that was made known, unless it is in the recording already.
+    /// Logs one step of a known run, unless it is already in the recording.
     pub(super) fn log_step(&mut self, run: &RunLog<'_>, stops: &dyn Stops, trace: &RunStep) -> Logged {
         let root = root(run.target, run.run);
         if !self.runs.get_mut(&root).is_some_and(|known| known.steps.insert(trace.step)) {
@@ -209,11 +210,11 @@ impl Recorder {
         if self.measured.insert(trace.step) {
             log_odometry(&self.stream, stops, trace)?;
         }
-        // Last: those in which the motion was measured are there by now.
+        // Last, because by this time the images used by odometry exist.
         self.log_images_at_hand(stops, trace.step, camera)
     }
 
-    /// Logs the images of the cameras beside the main pair and `tracked` that are there without being rendered.
+    /// Logs the existing images of further cameras except `tracked`, without rendering.
     fn log_images_at_hand(&mut self, stops: &dyn Stops, step: usize, tracked: Option<CameraName>) -> Logged {
         for name in stops.further_cameras(step).iter().map(|camera| camera.name) {
             if Some(name) == tracked || self.captured.contains(&(step, Some(name))) {
@@ -238,19 +239,18 @@ impl Recorder {
     }
 }
 
-/// The side of the template; 0 where none was prepared.
+/// The side of the template, px; 0 if none was prepared.
 fn template_size_px(trace: &RunStep) -> u32 {
     let prepared = trace.template().and_then(|evidence| evidence.scale_roll.as_ref());
     prepared.and_then(|prepared| prepared.reference.get()).map_or(0, |reference| reference.width())
 }
 
-/// The images of a step. Those of a run that was read back from disk are not in the trace and come from the
-/// traverse.
+/// The images of a step. A run restored from disk has none in its trace; they are then read from the traverse.
 fn images(trace: &RunStep, stops: &dyn Stops) -> Option<[Arc<GrayImage>; 2]> {
-    let kept = trace.capture()?.pair.clone();
+    let held = trace.capture()?.pair.clone();
     let camera = trace.update.target.designation.camera;
     let read = || pair::capture(stops, trace.step, camera, Cancel::default()).ok();
-    let pair = if kept.left.width() > 0 { kept } else { read()? };
+    let pair = if held.left.width() > 0 { held } else { read()? };
     Some([pair.left, pair.right])
 }
 

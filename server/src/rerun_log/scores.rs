@@ -1,7 +1,7 @@
 //! The numbers of a step, one scalar per entity, for the time series.
 //!
-//! Every number that a stage declares is logged as `/{target}/record/{stage}/{quantity}`. Those that the layout plots have
-//! entities of their own beside the evidence, with a colour: a table of the entity and the quantity or gate that it shows.
+//! Every number declared by a stage is logged as `/{target}/record/{stage}/{quantity}`. Numbers plotted by the layout also
+//! have coloured entities next to the evidence: a table of entities with the quantity or gate that each shows.
 
 use rerun::{RecordingStream, Scalars};
 use sightline_record::{Kind, Unit};
@@ -12,12 +12,12 @@ use super::Logged;
 use super::palette::{FAILED, LIMIT, LOST, MEASUREMENT, PREDICTION, Rgb, SECOND_PEAK, TRACKING, color};
 use super::step::{Step, log_series, path};
 
-/// One number of a step.
+/// One plotted number of a step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Score {
-    /// Its entity; a unit at the end of its name is the unit in which it is logged.
+    /// Its entity; a suffix such as `_deg` is the unit in which it is logged.
     pub(super) entity: &'static str,
-    /// When there is such a number.
+    /// The condition for the number, in words.
     pub(super) when: &'static str,
     /// The number in the record: `stage.quantity`, or `stage.gates.name.value` and `.limit` of a gate.
     source: &'static str,
@@ -28,7 +28,7 @@ const fn score(entity: &'static str, when: &'static str, rgb: Rgb, source: &'sta
     Score { entity, when, source, rgb }
 }
 
-/// All numbers, in the order of the stages.
+/// All plotted numbers, in the order of the stages.
 #[rustfmt::skip]
 pub(super) const SCORES: &[Score] = &[
     score("/{target}/point_mast/wanted_azimuth_deg", "there is a mast and it reaches", PREDICTION, "point_mast.wanted.azimuth_rad"),
@@ -73,7 +73,7 @@ pub(super) const SCORES: &[Score] = &[
 ];
 
 impl Score {
-    /// The number at a step; what is not finite cannot be drawn and counts as missing.
+    /// The number at a step; `None` if it is missing or not finite.
     pub(super) fn at(&self, trace: &RunStep) -> Option<f64> {
         self.read(trace).filter(|value| value.is_finite())
     }
@@ -91,7 +91,7 @@ impl Score {
         Some(quantity.number(trace)? * (logged.per_base() / declared.per_base()))
     }
 
-    /// The last words of the entity: `ncc`, or `ncc limit` below it.
+    /// The last segment of the entity, such as `ncc`, or `ncc limit` for a limit.
     fn name(&self) -> String {
         let mut words = self.entity.rsplit('/');
         let last = words.next().unwrap_or_default();
@@ -99,7 +99,7 @@ impl Score {
     }
 }
 
-/// Every number that the stages declare, in their order.
+/// Every number declared by the stages, in their order.
 pub(super) fn declared() -> impl Iterator<Item = StageQuantity> {
     StageQuantity::all()
         .filter(|quantity| matches!(quantity.declared().kind, Kind::Number | Kind::Count | Kind::Flag))
@@ -116,19 +116,19 @@ fn name_of(quantity: StageQuantity) -> String {
     format!("{} {}", declared.name, declared.unit.symbol()).trim_end().to_owned()
 }
 
-/// The numbers that the stages declare.
+/// Logs the numbers declared by the stages.
 pub(super) fn log_declared(step: &Step<'_>) -> Logged {
     declared().try_for_each(|number| {
         step.log(&entity_of(number), number.number(step.trace).map(|value| Scalars::new([value])))
     })
 }
 
-/// One number of a step.
+/// Logs one plotted number of a step.
 pub(super) fn log_score(step: &Step<'_>, score: &Score) -> Logged {
     step.log(score.entity, score.at(step.trace).map(|value| Scalars::new([value])))
 }
 
-/// How the numbers of a run are drawn: their names and colours, limits thinner than what they limit.
+/// Logs the drawing style of a run's numbers: names and colours, with limits thinner than the limited quantities.
 pub(super) fn log_styles(stream: &RecordingStream, root: &str) -> Logged {
     declared().try_for_each(|number| {
         log_series(stream, &path(&entity_of(number), root), &name_of(number), color(MEASUREMENT), 2.0)

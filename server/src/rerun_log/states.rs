@@ -1,4 +1,4 @@
-//! The tracking state of every step: as a band over time, and as a line of the log that says why.
+//! The tracking state of every step: as a band over time, and as a line of the log with the reason.
 
 use rerun::{RecordingStream, StateChange, StateConfiguration, TextDocument, TextLog, TextLogLevel};
 use sightline_track::target::TrackingState;
@@ -35,7 +35,7 @@ pub(super) fn log_styles(stream: &RecordingStream, root: &str) -> Logged {
     stream.log_static(path("/{target}/judge/state", root), &configuration)
 }
 
-/// What the person calls the run and how its target was designated.
+/// The label of the run and the designation of its target.
 pub(super) fn log_run(stream: &RecordingStream, root: &str, label: &str, first: &StepTrace) -> Logged {
     let at = first.update.target.designation;
     let text = format!(
@@ -58,7 +58,7 @@ fn sentence(trace: &StepTrace) -> String {
     }
 }
 
-/// A fault of the files is an error whatever the state, because it can be mended.
+/// A fault of the files is an error in any state, because it can be repaired.
 fn level(trace: &StepTrace) -> &'static str {
     match trace.update.state {
         _ if trace.fault().is_some() => TextLogLevel::ERROR,

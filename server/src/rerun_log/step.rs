@@ -1,4 +1,4 @@
-//! One step of one run on its way into a recording: where its rows go, and what the `log_*` functions read.
+//! One step of one run as input of the `log_*` functions.
 
 use std::sync::Arc;
 
@@ -15,30 +15,30 @@ use sightline_track::locate::template::match_template::TemplateMatch;
 use sightline_vision::image::GrayImage;
 
 use super::Logged;
-use super::border::ellipsoids;
+use super::convert::ellipsoids;
 use super::palette::{Rgb, color, faint};
 
 /// One step of one run.
 pub(super) struct Step<'a> {
-    /// Where the rows go.
+    /// The recording.
     pub(super) stream: &'a RecordingStream,
     /// The run's name in entity paths.
     pub(super) root: &'a str,
-    /// What the person calls the run.
+    /// The user's label of the run.
     pub(super) label: &'a str,
-    /// What the stages saw and decided.
+    /// The record of the stages.
     pub(super) trace: &'a RunStep,
     /// The marks over its images.
     pub(super) marks: Vec<Mark>,
-    /// The left and the right image of the stop, where they could be read and are still to be logged.
+    /// The left and the right image of the stop; `None` if they could not be read or are already logged.
     pub(super) images: Option<[Arc<GrayImage>; 2]>,
     /// The estimated pose of the stop.
     pub(super) site_from_rover: Pose,
 }
 
 impl Step<'_> {
-    /// Logs `value` at this step. Without a value the entity is cleared, because a viewer would go on showing
-    /// the last step's.
+    /// Logs `value` at this step. Without a value the entity is cleared, because a viewer would continue to show the last
+    /// step's value.
     pub(super) fn log<A: AsComponents>(&self, entity: &str, value: Option<A>) -> Logged {
         let path = path(entity, self.root);
         match value {
@@ -47,7 +47,7 @@ impl Step<'_> {
         }
     }
 
-    /// The pair in which the target is tracked.
+    /// The pair used for tracking the target; `None` for the main pair.
     pub(super) fn camera(&self) -> Option<CameraName> {
         self.trace.update.target.designation.camera
     }
@@ -67,17 +67,17 @@ impl Step<'_> {
         self.template().and_then(|evidence| evidence.match_template.as_ref())
     }
 
-    /// The shape of a mark over the images, where the step has it.
+    /// The shape of a mark; `None` if the step does not have it.
     pub(super) fn mark(&self, name: MarkName) -> Option<&Shape> {
         self.marks.iter().find(|mark| mark.name == name).map(|mark| &mark.shape)
     }
 
-    /// A point of the present rover frame in the site frame of the estimated pose.
+    /// Transforms a point from the rover frame of this step to the site frame, with the estimated pose.
     pub(super) fn in_site(&self, point_in_rover: &Point3) -> Point3 {
         self.site_from_rover * point_in_rover
     }
 
-    /// The ellipsoids of a covariance in the rover frame, turned into the site frame.
+    /// The ellipsoids of a covariance in the rover frame, rotated to the site frame.
     pub(super) fn spread(
         &self,
         point_in_rover: &Point3,
@@ -91,13 +91,13 @@ impl Step<'_> {
     }
 }
 
-/// The path of an entity for the run called `root`.
+/// The path of an entity for the run with path name `root`.
 pub(super) fn path(entity: &str, root: &str) -> String {
     entity.replace("{target}", root)
 }
 
-/// Logs how a scalar is drawn, once and for all steps: every step by itself, because the viewer would otherwise
-/// draw the mean of neighbours where a plot is small, and a lost step between good ones would look half good.
+/// Logs the drawing style of a scalar as static data. Aggregation is off: the viewer would otherwise draw the mean of
+/// neighbours in a small plot, and a lost step between good ones would look half good.
 pub(super) fn log_series(
     stream: &RecordingStream,
     path: &str,

@@ -1,7 +1,7 @@
-//! The patches of `locate`: how the template was prepared and what it was compared with.
+//! The patches of `locate`: the prepared template and the matched windows.
 //!
-//! The four patches that must look alike share their limits, the darkest and the brightest value among them.
-//! The difference is in standard deviations and has fixed, symmetric limits.
+//! The four patches that should look the same share their limits, their smallest and largest value. The difference is in
+//! standard deviations and has fixed, symmetric limits.
 
 use rerun::components::Colormap;
 use rerun::{ColorModel, DepthImage, Image};
@@ -9,26 +9,26 @@ use sightline_record::Unsent;
 use sightline_vision::image::Patch;
 
 use super::Logged;
-use super::border::mapped;
+use super::convert::mapped;
 use super::palette::of_difference;
 use super::step::Step;
 
-/// Limit of the difference's colours, standard deviations of a patch.
+/// Limit of the difference colours, standard deviations of a patch.
 const DIFFERENCE_LIMIT: f32 = 3.0;
 
-/// The template as it was taken.
+/// The original template.
 pub(super) fn log_reference(step: &Step<'_>) -> Logged {
     let patch = step.template().and_then(|e| e.scale_roll.as_ref()?.reference.get());
     step.log("/{target}/locate/scale_roll/reference", patch.and_then(|p| grey(p, shared_limits(step))))
 }
 
-/// The template, scaled.
+/// The scaled template.
 pub(super) fn log_scaled(step: &Step<'_>) -> Logged {
     let patch = step.template().and_then(|e| e.scale_roll.as_ref()?.scaled.get());
     step.log("/{target}/locate/scale_roll/scaled", patch.and_then(|p| grey(p, shared_limits(step))))
 }
 
-/// The template, scaled and rolled: what was matched.
+/// The scaled and rolled template, which was matched.
 pub(super) fn log_rolled(step: &Step<'_>) -> Logged {
     let patch = step.template().and_then(|e| e.scale_roll.as_ref()?.rolled.get());
     step.log("/{target}/locate/scale_roll/rolled", patch.and_then(|p| grey(p, shared_limits(step))))
@@ -40,13 +40,13 @@ pub(super) fn log_matched(step: &Step<'_>) -> Logged {
     step.log("/{target}/locate/match_template/matched", patch.and_then(|p| grey(p, shared_limits(step))))
 }
 
-/// Matched minus rolled, both normalised.
+/// Matched window minus rolled template, both normalised.
 pub(super) fn log_difference(step: &Step<'_>) -> Logged {
     let patch = step.matched().and_then(|m| m.difference.get());
     step.log("/{target}/locate/match_template/difference", patch.map(signed))
 }
 
-/// The right image at the stereo match, as the left sees it.
+/// The right image at the stereo match, resampled to the left view.
 pub(super) fn log_right_window(step: &Step<'_>) -> Logged {
     let patch = step.template().and_then(|e| e.point_stereo.as_ref()?.right_window.get());
     step.log("/{target}/locate/point_stereo/right_window", patch.and_then(|p| grey(p, limits([p]))))
@@ -59,7 +59,7 @@ fn shared_limits(step: &Step<'_>) -> [f64; 2] {
     limits(prepared.chain(step.matched().and_then(|m| m.matched.get())))
 }
 
-/// The least and the greatest valid value; never equal, so that a flat patch still has a colour.
+/// The smallest and largest valid value; never equal, so that a flat patch has a valid colour range.
 fn limits<'a>(patches: impl IntoIterator<Item = &'a Patch>) -> [f64; 2] {
     let values = patches.into_iter().flat_map(|p| p.as_raw()).filter(|v| v.is_finite());
     let [low, high] = values.fold([f32::MAX, f32::MIN], |[low, high], &v| [low.min(v), high.max(v)]);
@@ -70,7 +70,7 @@ fn grey(patch: &Patch, limits: [f64; 2]) -> Option<DepthImage> {
     mapped(patch.dimensions().into(), patch.as_raw(), limits, Colormap::Grayscale)
 }
 
-/// Blue below, white at zero, red above; an invalid pixel is transparent.
+/// Blue below zero, white at zero, red above; invalid pixels are transparent.
 fn signed(patch: &Patch) -> Image {
     let rgba = patch.as_raw().iter().flat_map(|v| {
         let [r, g, b] = of_difference(v / DIFFERENCE_LIMIT);

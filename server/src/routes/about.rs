@@ -1,4 +1,4 @@
-//! `GET version` and `GET health`: what this program is, and whether it is well.
+//! `GET version` and `GET health`: version and status of the program.
 
 use axum::Json;
 use axum::extract::State;
@@ -20,7 +20,7 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
         .routes(route::<ShowHealth>(routes!(health)))
 }
 
-/// What this program is
+/// The name and version of the program
 #[utoipa::path(get, operation_id = "show_version", path = ShowVersion::PATH, tag = "about", responses((status = 200, body = Version)))]
 async fn version(State(state): State<AppState>) -> Json<Version> {
     let limits = state.limits();
@@ -37,7 +37,7 @@ async fn version(State(state): State<AppState>) -> Json<Version> {
     })
 }
 
-/// Whether the server is well
+/// The health of the server
 #[utoipa::path(get, operation_id = "show_health", path = ShowHealth::PATH, tag = "about", responses((status = 200, body = Health)))]
 async fn health(State(state): State<AppState>) -> Json<Health> {
     Json(Health { status: "ok".to_owned(), notices: state.notices(), usage: state.usage() })

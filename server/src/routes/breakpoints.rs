@@ -1,4 +1,4 @@
-//! `sessions/{session}/breakpoints`: conditions that are looked for at all steps of all runs, with what they hit.
+//! `sessions/{session}/breakpoints`: conditions evaluated at all steps of all runs, with their hits.
 
 use axum::Json;
 use axum::extract::State;
@@ -38,7 +38,7 @@ async fn list(SessionPath(live): SessionPath) -> ApiResult<Json<Vec<BreakpointVi
 
 /// Sets a breakpoint
 ///
-/// It is a condition, or the stop to break at. One with the same condition is switched on instead.
+/// It is a condition or a stop. An existing breakpoint with the same condition is enabled instead.
 #[utoipa::path(post, operation_id = "add_breakpoint", path = AddBreakpoint::PATH, tag = "breakpoints",
     request_body = NewBreakpoint, responses((status = 201, body = BreakpointView),
     ExpressionRefusal, ApiError))]
@@ -94,7 +94,7 @@ async fn change(
     .await
 }
 
-/// Removes a breakpoint; its number is not used again
+/// Removes a breakpoint; its number is not reused
 #[utoipa::path(delete, operation_id = "remove_breakpoint", path = RemoveBreakpoint::PATH,
     tag = "breakpoints", responses((status = 204, description = "It is gone"), ApiError))]
 async fn remove(
@@ -117,10 +117,10 @@ fn view(live: &LiveSession, number: usize) -> ApiResult<Json<BreakpointView>> {
     found.map(Json).ok_or_else(|| ApiError::not_found("There is no such breakpoint."))
 }
 
-/// What is wrong with an expression, with its place.
+/// The problem of an invalid expression, with the position of the error.
 pub(crate) fn refused(wrong: &Refused) -> ApiError {
     let problem = ApiError::invalid("expression", format!("expression: {wrong}"));
-    let problem = problem.place("expression", wrong.from, wrong.to);
+    let problem = problem.with_range("expression", wrong.from, wrong.to);
     match &wrong.hint {
         Some(hint) => problem.hint(hint.clone()),
         None => problem,

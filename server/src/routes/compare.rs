@@ -1,4 +1,4 @@
-//! `…/compare` and `…/runs/{run}/metrics`: runs side by side, and what one is worth.
+//! `…/compare` and `…/runs/{run}/metrics`: runs side by side, and the metrics of one run.
 
 use axum::Json;
 use axum::extract::State;
@@ -23,15 +23,15 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
 
 /// Compares two to four runs of a session
 ///
-/// The first one is what the others are compared with: their columns with differences, where each differs from it
-/// first, and the settings that are not alike. Nothing is changed by it.
+/// The first run is the reference: the answer contains the columns of the others with differences, the first step at which
+/// each differs, and the settings that are not equal. Has no side effects.
 #[utoipa::path(post, operation_id = "compare_runs", path = CompareRuns::PATH, tag = "runs", request_body = NewComparison, responses((status = 200, body = Comparison), ApiError))]
 async fn compare_runs(
     State(state): State<AppState>,
     SessionPath(live): SessionPath,
     Body(new): Body<CompareRuns>,
 ) -> ApiResult<Json<Comparison>> {
-    // The steps are shared values: the session is not locked while they are compared.
+    // The steps are shared, so the session is not locked during the comparison.
     let runs = live.with(|session| session.compared(&new.runs))?;
     state.queries().run(move || Ok(Json(compare::compare(&runs, &new)?))).await
 }

@@ -1,4 +1,4 @@
-//! `documents`: small things that a page keeps beside the sessions, such as arrangements of panels.
+//! `documents`: small documents that the page stores next to the sessions, such as arrangements of panels.
 
 use axum::Json;
 use axum::extract::State;
@@ -50,7 +50,7 @@ async fn show(
 
 /// Replaces a document, or adds one
 ///
-/// The header `If-Match` names the revision that was read; `If-None-Match: *` says that there is none yet.
+/// The header `If-Match` names the revision that was read; `If-None-Match: *` creates a new document.
 #[utoipa::path(put, operation_id = "put_document", path = PutDocument::PATH, tag = "documents", params(("If-Match" = Option<String>, Header, pattern = r#"^("[0-9]{1,18}"|\*)$"#, description = "The revision in quotes, or *"),
     ("If-None-Match" = Option<String>, Header, pattern = r"^\*$", description = "* for a new one")),
     request_body = serde_json::Value, responses((status = 200, body = Document), ApiError))]

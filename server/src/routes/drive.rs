@@ -1,7 +1,7 @@
-//! `…/drive`: driving on commands.
+//! `…/drive`: commanded drives.
 //!
-//! A drive on commands has a world and a session of its own: beginning one, or branching one at an earlier stop, leaves the
-//! session from which it begins as it is.
+//! A commanded drive has its own world and session: starting one, or branching at an earlier stop, does not change the
+//! original session.
 
 use std::sync::Arc;
 
@@ -26,7 +26,7 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use crate::cancel::CancelFlag;
-use crate::driven;
+use crate::commanded_drive;
 use crate::drives::scenario_of;
 use crate::extract::{Body, Path, RunPath, SessionPath};
 use crate::jobs::blocking;
@@ -34,7 +34,7 @@ use crate::live_session::LiveSession;
 use crate::problem::{ApiError, ApiResult};
 use crate::rendering::OpenTraverse;
 use crate::routes::route::{location, route};
-use crate::routes::targets::start_or_say;
+use crate::routes::targets::start_or_fail;
 use crate::state::AppState;
 
 /// The routes of this resource.
@@ -46,10 +46,10 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
         .routes(route::<ShowHazards>(routes!(hazards)))
 }
 
-/// Begins a drive on commands with a run
+/// Begins a commanded drive with a run
 ///
-/// The rover drives towards the run's target on the run's estimates, in a new session with a world of its own. From a drive on
-/// commands it branches at any stop; any other simulated drive is driven anew from its first stop.
+/// The rover drives towards the run's target on the run's estimates, in a new session with its own world. A commanded drive
+/// can be branched at any stop; any other simulated drive restarts at its first stop.
 #[utoipa::path(post, operation_id = "begin_drive", path = BeginDrive::PATH, tag = "drive", request_body = NewDrive, responses((status = 201, body = SessionView), ApiError))]
 async fn begin(
     State(state): State<AppState>,
@@ -68,27 +68,27 @@ async fn begin(
 /// The drive of a session
 #[utoipa::path(get, operation_id = "show_drive", path = ShowDrive::PATH, tag = "drive", responses((status = 200, body = DriveView), ApiError))]
 async fn show(SessionPath(live): SessionPath) -> ApiResult<Json<DriveView>> {
-    blocking(move || Ok(Json(driven::view(&live)))).await
+    blocking(move || Ok(Json(commanded_drive::view(&live)))).await
 }
 
 /// The goodness map at a stop of the drive of a session
 ///
-/// The map on which the navigator chose the path there, from the stereo pairs of the stops up to it.
+/// The map used by the navigator to choose the path there, from the stereo pairs of the stops so far.
 #[utoipa::path(get, operation_id = "show_hazards", path = ShowHazards::PATH, tag = "drive", responses((status = 200, body = HazardView), ApiError))]
 async fn hazards(
     State(state): State<AppState>,
     Path(AtDriveStop { session, step }): Path<ShowHazards>,
 ) -> ApiResult<Json<HazardView>> {
     let live = state.session(&session)?;
-    let work = move |cancel: &CancelFlag| Ok(Json(driven::hazards(&live, step, cancel)?));
+    let work = move |cancel: &CancelFlag| Ok(Json(commanded_drive::hazards(&live, step, cancel)?));
     state.tries().run_until_dropped(work).await
 }
 
-/// Lets a run drive, or changes its command
+/// Makes a run steer the drive, or changes its command
 ///
-/// A run that was stopped goes on. `pause_at` lets the rover wait at a stop: at the present one it is a pause, at the next one a
-/// single step. `pause` chooses the stage before or after which it waits; the step of a stop is then computed up to there, and again
-/// up to there with every run that is forked from it.
+/// A stopped run continues. `pause_at` makes the rover wait at a stop: the current stop is a pause, the next one a single
+/// step. `pause` chooses the stage before or after which it waits; the step of that stop is computed up to there, also in
+/// every run forked from it.
 #[utoipa::path(put, operation_id = "steer_drive", path = SteerDrive::PATH, tag = "drive", request_body = Steering, responses((status = 200, body = DriveView), ApiError))]
 async fn steer(
     State(state): State<AppState>,
@@ -97,7 +97,7 @@ async fn steer(
 ) -> ApiResult<Json<DriveView>> {
     blocking(move || {
         let open = live.traverse();
-        if open.driven.is_none() {
+        if open.commanded.is_none() {
             return Err(ApiError::conflict("The drive of this session is not on commands.")
                 .hint("POST …/targets/{target}/runs/{run}/drive begins one from it."));
         }
@@ -109,15 +109,15 @@ async fn steer(
             }
             Ok(())
         })?;
-        // The pause holds the other runs, too.
+        // The pause also applies to the other runs.
         state.runner().follow(&live, (&live, (target, run)));
-        start_or_say(&state, &live, target, run);
-        Ok(Json(driven::view(&live)))
+        start_or_fail(&state, &live, target, run);
+        Ok(Json(commanded_drive::view(&live)))
     })
     .await
 }
 
-/// Makes the world and the session of a drive, and begins to drive.
+/// Creates the world and the session of a drive, and starts to drive.
 fn add(
     state: &AppState,
     live: &Arc<LiveSession>,
@@ -131,7 +131,7 @@ fn add(
     let open = live.traverse();
     let (saved, last, waiting) = live.with(|session| {
         let steps = &session.run(target, run).map_err(|error| ApiError::from(error).about_path())?.steps;
-        // Refused before a world is made.
+        // Checked before a world is created.
         let mut steered = session.clone();
         steered.steer(&open.traverse, steering.clone())?;
         let waiting = steered.steering.map(|steered| steered.command.waiting).unwrap_or_default();
@@ -139,7 +139,7 @@ fn add(
     })?;
     let designated = saved.targets[target].designation.step;
     let from_step = from_step(&open, new, designated, last)?;
-    // From an earlier stop, the goal is approached from the place of the designation.
+    // From an earlier stop, the approach to the goal starts at the position of the designation.
     let since = steering.command.since.filter(|since| *since <= from_step);
     let steering = Steering { command: DriveCommand { waiting, since, ..steering.command }, ..steering };
     for (index, later) in new.then.iter().enumerate() {
@@ -157,14 +157,14 @@ fn add(
         target.map(|target| target.designation)
     };
     let faults = faults::placed(&open.traverse, &new.faults, known, target)?;
-    let folder = driven::new_folder(state.folders(), &open.traverse.index().name)?;
+    let folder = commanded_drive::new_folder(state.folders(), &open.traverse.index().name)?;
     let made = world(&open, from_step, &faults, &folder, cancel).and_then(|world| {
         state.limits().check_drive(world.traverse())?;
-        let opened = driven::open(world, state.cache(), state.events())?;
+        let opened = commanded_drive::open(world, state.cache(), state.events())?;
         Ok(state.add_traverse(Arc::new(opened))?)
     });
     let opened = made.inspect_err(|_| {
-        // If this fails too, the next start lists the drive, and it can be removed there.
+        // If this fails too, the next start lists the drive, where the user can remove it.
         let _ = std::fs::remove_dir_all(&folder);
     })?;
     let driving = state.enter_session(Arc::clone(&opened), false, |id| {
@@ -172,13 +172,13 @@ fn add(
         let saved = SavedSession { id, traverse: opened.id.clone(), ..saved };
         Ok((Session::restored(&saved, from_step + 1)?, Default::default()))
     })?;
-    // Asking for it begins its runs, and then the drive.
+    // Loading the session starts its runs, and then the drive.
     state.session(&driving.id)
 }
 
-/// The stop from which is driven.
+/// The stop at which the drive begins.
 fn from_step(open: &OpenTraverse, new: &NewDrive, designated: usize, last: usize) -> ApiResult<usize> {
-    let is_driven = open.driven.is_some();
+    let is_driven = open.commanded.is_some();
     let step = new.from_step.unwrap_or(if is_driven { last } else { 0 });
     let wrong = |what: String| Err(ApiError::invalid("field", format!("from_step: {what}")));
     if !is_driven && (step > 0 || designated > 0) {
@@ -193,7 +193,7 @@ fn from_step(open: &OpenTraverse, new: &NewDrive, designated: usize, last: usize
     Ok(step)
 }
 
-/// The world in which is driven.
+/// The world of the drive.
 fn world(
     open: &OpenTraverse,
     from_step: usize,
@@ -201,8 +201,8 @@ fn world(
     folder: &std::path::Path,
     cancel: &CancelFlag,
 ) -> ApiResult<DrivenTraverse> {
-    if let Some(driven) = &open.driven {
-        return Ok(driven.with(|world| world.branch(from_step + 1, faults, folder, cancel.as_ref().into()))?);
+    if let Some(drive) = &open.commanded {
+        return Ok(drive.with(|world| world.branch(from_step + 1, faults, folder, cancel.as_ref().into()))?);
     }
     let mut scenario = scenario_of(&open.traverse).ok_or_else(|| {
         ApiError::conflict("A recorded drive cannot be driven.")
@@ -212,8 +212,8 @@ fn world(
     Ok(DrivenTraverse::begin(&scenario, folder, cancel.as_ref().into())?)
 }
 
-/// What the session of the drive begins with: its targets with their runs, the first one first. The visits that had ended up to
-/// the stop from which is driven are those of the drive, too.
+/// The initial session of the drive: its targets with their runs, the current target first, and the visits that ended before
+/// the first stop of the drive.
 fn session_of(saved: SavedSession, steering: Steering, from_step: usize) -> SavedSession {
     let Steering { target, run, .. } = steering;
     let visits = saved.visits.into_iter().filter(|visit| visit.until <= from_step);
@@ -229,10 +229,10 @@ fn session_of(saved: SavedSession, steering: Steering, from_step: usize) -> Save
     let then = steering.then.iter().map(|number| renumbered(*number)).collect();
     let targets = numbers.iter().filter_map(|number| saved.targets.get(*number).cloned());
     let mut targets: Vec<SavedTarget> = targets.collect();
-    // A run that was stopped drives on.
+    // A stopped run continues.
     let drivers = targets.first_mut().and_then(|target| target.runs.get_mut(run));
     drivers.into_iter().for_each(|run| run.stop_after = None);
-    // The new drive lacks the later stops: what was changed there is changed from here on.
+    // The new drive lacks the later stops, so changes there apply from its first stop.
     let forks = targets.iter_mut().flat_map(|target| &mut target.runs).filter_map(|run| run.fork.as_mut());
     for fork in forks.filter(|fork| fork.from_step > from_step) {
         *fork = Fork::new(fork.run, from_step);

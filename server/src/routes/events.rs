@@ -1,7 +1,7 @@
-//! `GET events`: a WebSocket on which the server tells every open page what has changed.
+//! `GET events`: a WebSocket on which the server notifies every open page of changes.
 //!
-//! Nothing is ever waited for here: events go through a bounded channel, and a page too slow for it is told
-//! to read everything again instead. What a page sends is not read, beyond the answers to our pings.
+//! The server never waits for a page: events go through a bounded channel, and a page that is too slow is asked to read
+//! everything again. Messages from a page are ignored, except for the answers to our pings.
 
 use std::time::Duration;
 
@@ -22,12 +22,12 @@ use crate::problem::{ApiError, ApiResult};
 use crate::routes::route::route;
 use crate::state::AppState;
 
-/// The largest message that a page may send, bytes.
+/// Maximum size of a message from a page, bytes.
 const MESSAGE_LIMIT: usize = 64 << 10;
-/// How often a page is asked whether it is still there.
+/// Interval of pings.
 const PING_PERIOD: Duration = Duration::from_secs(15);
-/// How long a page may be silent, or take for one message.
-const PATIENCE: Duration = Duration::from_secs(40);
+/// Timeout for silence of a page, and for sending one message.
+const SILENCE_TIMEOUT: Duration = Duration::from_secs(40);
 
 /// The routes of this resource.
 pub(crate) fn router() -> OpenApiRouter<AppState> {
@@ -50,13 +50,13 @@ async fn listen(
     }
     let events = state.events().subscribe();
     let upgrade = upgrade.max_message_size(MESSAGE_LIMIT).max_frame_size(MESSAGE_LIMIT);
-    Ok(upgrade.on_upgrade(move |socket| tell(socket, events, state)))
+    Ok(upgrade.on_upgrade(move |socket| forward_events(socket, events, state)))
 }
 
-/// Tells one page until it goes away.
-async fn tell(mut socket: WebSocket, mut events: Receiver<Event>, state: AppState) {
+/// Sends events to one page until it disconnects.
+async fn forward_events(mut socket: WebSocket, mut events: Receiver<Event>, state: AppState) {
     let mut ping = tokio::time::interval(PING_PERIOD);
-    let mut heard = tokio::time::Instant::now();
+    let mut last_message = tokio::time::Instant::now();
     let mut queue = state.everything_may_have_changed();
     loop {
         for event in queue.drain(..) {
@@ -73,10 +73,11 @@ async fn tell(mut socket: WebSocket, mut events: Receiver<Event>, state: AppStat
             },
             message = socket.recv() => match message {
                 Some(Ok(Message::Close(_)) | Err(_)) | None => return,
-                Some(Ok(_)) => heard = tokio::time::Instant::now(),
+                Some(Ok(_)) => last_message = tokio::time::Instant::now(),
             },
             _ = ping.tick() => {
-                if heard.elapsed() > PATIENCE || !send(&mut socket, Message::Ping(Vec::new().into())).await {
+                let is_silent = last_message.elapsed() > SILENCE_TIMEOUT;
+                if is_silent || !send(&mut socket, Message::Ping(Vec::new().into())).await {
                     return;
                 }
             }
@@ -85,5 +86,5 @@ async fn tell(mut socket: WebSocket, mut events: Receiver<Event>, state: AppStat
 }
 
 async fn send(socket: &mut WebSocket, message: Message) -> bool {
-    matches!(tokio::time::timeout(PATIENCE, socket.send(message)).await, Ok(Ok(())))
+    matches!(tokio::time::timeout(SILENCE_TIMEOUT, socket.send(message)).await, Ok(Ok(())))
 }

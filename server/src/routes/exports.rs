@@ -1,4 +1,4 @@
-//! `…/exports`: a session as files; the work ends when the request goes away.
+//! `…/exports`: a session as files; the export is cancelled when the request is dropped.
 
 use std::ops::ControlFlow;
 
@@ -16,7 +16,7 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use crate::cancel::{CancelFlag, CancelOnDrop};
-use crate::exports::{Kind, Made, Part, Source, catalogue, make};
+use crate::exports::{ExportFormat, ExportedFile, SessionPart, Source, catalogue, make};
 use crate::extract::{Params, Path, SessionPath};
 use crate::problem::{ApiError, ApiResult};
 use crate::routes::route::route;
@@ -30,8 +30,8 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
         .routes(route::<ExportFile>(routes!(file)))
 }
 
-/// What a session can be exported as, with sizes and commands
-#[utoipa::path(get, operation_id = "list_exports", path = ListExports::PATH, tag = "exports", params(Part), responses((status = 200, body = Vec<ExportEntry>), ApiError))]
+/// The available exports of a session, with sizes and commands
+#[utoipa::path(get, operation_id = "list_exports", path = ListExports::PATH, tag = "exports", params(SessionPart), responses((status = 200, body = Vec<ExportEntry>), ApiError))]
 async fn list(
     State(state): State<AppState>,
     SessionPath(live): SessionPath,
@@ -39,7 +39,7 @@ async fn list(
 ) -> ApiResult<Json<Vec<ExportEntry>>> {
     let work = move |cancel: &CancelFlag| {
         let source = Source::of(&live);
-        source.check(Kind::Csv, part)?;
+        source.check(ExportFormat::Csv, part)?;
         Ok(Json(catalogue::catalogue(&source, part, cancel.as_ref().into())?))
     };
     state.queries().run_until_dropped(work).await
@@ -47,16 +47,19 @@ async fn list(
 
 /// A session, or a part of it, as a file
 ///
-/// The work ends when the request goes away.
-#[utoipa::path(get, operation_id = "export_file", path = ExportFile::PATH, tag = "exports", params(("file" = String, Path, description = "One of the names that the list of exports gives"), Part),
+/// The export is cancelled when the request is dropped.
+#[utoipa::path(get, operation_id = "export_file", path = ExportFile::PATH, tag = "exports", params(("file" = String, Path, description = "One of the names that the list of exports gives"), SessionPart),
     responses((status = 200, content_type = "application/octet-stream", body = FileBytes), ApiError))]
 async fn file(
     State(state): State<AppState>,
     Path(AtExport { session, file }): Path<ExportFile>,
     Params(part): Params<ExportFile>,
 ) -> ApiResult<Response> {
-    let kind = Kind::from_name(&file).ok_or_else(|| {
-        ApiError::not_found(format!("The files are {}.", Kind::ALL.map(Kind::name).join(", ")))
+    let kind = ExportFormat::from_name(&file).ok_or_else(|| {
+        ApiError::not_found(format!(
+            "The files are {}.",
+            ExportFormat::ALL.map(ExportFormat::name).join(", ")
+        ))
     })?;
     let live = state.session(&session)?;
     let cancel = CancelOnDrop::default();
@@ -64,32 +67,32 @@ async fn file(
     let work = move || {
         let source = Source::of(&live);
         source.check(kind, part)?;
-        let part = source.narrowed(kind, part);
+        let part = source.resolve_part(kind, part);
         let name = source.file_name(kind, part);
-        let mut go_on = |_, _| ControlFlow::Continue(());
-        Ok((name, make(&source, kind, part, &flag, &mut go_on)?))
+        let mut proceed = |_, _| ControlFlow::Continue(());
+        Ok((name, make(&source, kind, part, &flag, &mut proceed)?))
     };
     let (name, made) = state.exports().run(work).await?;
     answer(kind, &name, made).await
 }
 
-/// The answer that browsers save under `name`, which is made of our own names; its length is known.
-pub(crate) async fn answer(kind: Kind, name: &str, made: Made) -> ApiResult<Response> {
+/// A download with the file name `name`, which the server composes; its length is known.
+pub(crate) async fn answer(kind: ExportFormat, name: &str, made: ExportedFile) -> ApiResult<Response> {
     let mut headers = vec![
         (header::CONTENT_TYPE, kind.media_type().to_owned()),
         (header::CONTENT_DISPOSITION, format!("attachment; filename=\"{name}\"")),
     ];
-    if kind == Kind::Report {
+    if kind == ExportFormat::Report {
         headers.push((header::CONTENT_SECURITY_POLICY, crate::html::ALONE.to_owned()));
     }
     let headers = axum::response::AppendHeaders(headers);
     match made {
-        Made::Bytes(bytes) => Ok((headers, bytes).into_response()),
-        Made::File(file, folder) => {
+        ExportedFile::Bytes(bytes) => Ok((headers, bytes).into_response()),
+        ExportedFile::File(file, folder) => {
             let file = tokio::fs::File::from_std(file);
             let length = file.metadata().await.map(|about| about.len());
             let length = length.map_err(|error| ApiError::internal(error.to_string()))?;
-            // The folder is removed when the last byte was sent or the request went away.
+            // The folder is removed after the last byte or when the request is dropped.
             let file = KeptFile { file, _folder: folder };
             let body = axum::body::Body::from_stream(ReaderStream::with_capacity(file, 1 << 16));
             Ok(([(header::CONTENT_LENGTH, length.to_string())], headers, body).into_response())
@@ -97,7 +100,7 @@ pub(crate) async fn answer(kind: Kind, name: &str, made: Made) -> ApiResult<Resp
     }
 }
 
-/// An open file with the temporary folder in which it lies.
+/// An open file with its temporary folder.
 struct KeptFile {
     file: tokio::fs::File,
     _folder: TempDir,

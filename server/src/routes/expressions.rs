@@ -1,4 +1,4 @@
-//! `expressions` and `sessions/{session}/query`: the language of expressions, and asking one at every step.
+//! `expressions` and `sessions/{session}/query`: the expression language, and queries over all steps.
 
 use axum::Json;
 use axum::extract::State;
@@ -22,44 +22,44 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
         .routes(route::<ShowExpressions>(routes!(show)))
         .routes(route::<CompleteExpression>(routes!(completion)))
-        .routes(route::<QuerySession>(routes!(ask)))
+        .routes(route::<QuerySession>(routes!(query_session)))
 }
 
-/// The language of expressions: every name with unit, meaning and stage, every function, every unit
+/// The expression language: every name with unit, meaning and stage, every function, every unit
 #[utoipa::path(get, operation_id = "show_expression_language", path = ShowExpressions::PATH, tag = "expressions",
     responses((status = 200, body = Language)))]
 async fn show() -> ApiResult<Json<Language>> {
     blocking(|| Ok(Json(query::language()))).await
 }
 
-/// What could be written at a place of an expression
+/// Completions at a position of an expression
 #[utoipa::path(post, operation_id = "complete_expression", path = CompleteExpression::PATH, tag = "expressions",
     request_body = CompletionQuery, responses((status = 200, body = Completion), ApiError))]
-async fn completion(Body(asked): Body<CompleteExpression>) -> Json<Completion> {
-    Json(complete(&asked.text, asked.cursor))
+async fn completion(Body(request): Body<CompleteExpression>) -> Json<Completion> {
+    Json(complete(&request.text, request.cursor))
 }
 
-/// Asks an expression at every step of every run: where it is true, and what its values are
+/// Evaluates an expression at every step of every run: where it is true, and its values
 #[utoipa::path(post, operation_id = "query_session", path = QuerySession::PATH, tag = "expressions",
     request_body = Query, responses((status = 200, body = QueryAnswer),
     ExpressionRefusal, ApiError))]
-async fn ask(
+async fn query_session(
     State(state): State<AppState>,
     SessionPath(live): SessionPath,
-    Body(asked): Body<QuerySession>,
+    Body(request): Body<QuerySession>,
 ) -> ApiResult<Json<QueryAnswer>> {
-    let read = if asked.values {
-        Expression::column(&asked.expression)
+    let read = if request.values {
+        Expression::column(&request.expression)
     } else {
-        Expression::read(&asked.expression)
+        Expression::read(&request.expression)
     };
     let expression = read.map_err(|wrong| refused(&wrong))?;
-    if let Some(target) = asked.target {
+    if let Some(target) = request.target {
         let there = live.with(|session| session.target(target).map(|_| ()));
         there
             .map_err(|_| ApiError::invalid("field", format!("target: the session has no target {target}")))?;
     }
-    // The steps are shared, so that the session is free while they are asked.
-    let steps = live.with(|session| session.steps_of(asked.target));
-    state.queries().run(move || Ok(Json(query::ask(&expression, &steps, asked.values)))).await
+    // The steps are shared, so the session is not locked during the query.
+    let steps = live.with(|session| session.steps_of(request.target));
+    state.queries().run(move || Ok(Json(query::ask(&expression, &steps, request.values)))).await
 }

@@ -1,4 +1,4 @@
-//! `POST login`: the token in exchange for a cookie, which images, downloads and WebSockets of a browser send.
+//! `POST login`: exchanges the token for a cookie, which browsers send with images, downloads and WebSockets.
 
 use axum::extract::State;
 use axum::http::{StatusCode, header};
@@ -21,8 +21,8 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
 
 /// Exchanges the access token for a cookie
 ///
-/// The page calls it once, with the token of the address that it was opened with. Scripts send the token itself
-/// with every request: `Authorization: Bearer TOKEN`.
+/// The page calls it once, with the token from its address. Scripts send the token itself with every request:
+/// `Authorization: Bearer TOKEN`.
 #[utoipa::path(post, operation_id = "log_in", path = LogIn::PATH, tag = "about", request_body = Login, security(()),
     responses((status = 204, description = "The cookie is set, or the server asks for no token"), ApiError))]
 async fn log_in(State(state): State<AppState>, Body(login): Body<LogIn>) -> ApiResult<impl IntoResponse> {

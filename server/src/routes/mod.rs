@@ -1,4 +1,4 @@
-//! The routes of the REST interface, one file a resource; [`openapi`] puts them together.
+//! The routes of the REST interface, one file per resource; [`openapi`] combines them.
 
 pub(crate) mod route;
 pub(crate) mod about;

@@ -1,4 +1,4 @@
-//! `sessions/{session}/notes`: what a person wrote about places of the drive.
+//! `sessions/{session}/notes`: the user's notes on steps and stops.
 
 use axum::Json;
 use axum::extract::State;
@@ -39,7 +39,7 @@ async fn list(SessionPath(live): SessionPath) -> ApiResult<Json<Vec<Note>>> {
     Ok(Json(live.with_notes(|notes| notes.list.clone())))
 }
 
-/// Pins a note; it comes last
+/// Adds a note at the end of the list
 #[utoipa::path(post, operation_id = "add_note", path = AddNote::PATH, tag = "notes", request_body = NewNote, responses((status = 201, body = Note), ApiError))]
 async fn add(
     State(state): State<AppState>,
@@ -65,7 +65,7 @@ async fn show(
     Ok(tagged(found.ok_or_else(|| missing(note))?))
 }
 
-/// Changes a note's words or its place in the list
+/// Changes a note's text or its place in the list
 ///
 /// The header `If-Match` names the revision that was read.
 #[utoipa::path(patch, operation_id = "edit_note", path = ChangeNote::PATH, tag = "notes", params(("If-Match" = String, Header, pattern = r#"^("[0-9]{1,18}"|\*)$"#, description = "The revision in quotes, or *")),
@@ -86,7 +86,7 @@ async fn edit(
     .await
 }
 
-/// Removes a note, which can be brought back
+/// Removes a note, which can be restored
 ///
 /// The header `If-Match` names the revision that was read.
 #[utoipa::path(delete, operation_id = "remove_note", path = RemoveNote::PATH, tag = "notes", params(("If-Match" = String, Header, pattern = r#"^("[0-9]{1,18}"|\*)$"#, description = "The revision in quotes, or *")),
@@ -104,7 +104,7 @@ async fn remove(
     .await
 }
 
-/// Brings a removed note back to its place
+/// Restores a removed note to its place
 #[utoipa::path(post, operation_id = "restore_note", path = RestoreNote::PATH, tag = "notes", responses((status = 200, body = Note), ApiError))]
 async fn restore(
     State(state): State<AppState>,
@@ -135,18 +135,18 @@ fn problem(note: u64, refused: Refused) -> ApiError {
     }
 }
 
-/// Changes the notes, writes them and tells every page.
+/// Changes the notes, writes them and notifies every page.
 fn change<T>(
     state: &AppState,
     live: &LiveSession,
     work: impl FnOnce(&Session, &mut Notes) -> ApiResult<T>,
 ) -> ApiResult<T> {
     let value = live.change_notes(state.store(), work)?;
-    state.tell(Event::NotesChanged { session: live.id.clone() });
+    state.send_event(Event::NotesChanged { session: live.id.clone() });
     Ok(value)
 }
 
-/// The notes that are pinned to a step of a run, or to the stop alone.
+/// The notes pinned to a step of a run, or to the stop only.
 pub(crate) fn at_step(notes: &Notes, target: usize, run: usize, step: usize) -> Vec<Note> {
     let is_here = |note: &&Note| {
         note.pin.step == step && note.pin.target.is_none_or(|t| t == target && note.pin.run == run)

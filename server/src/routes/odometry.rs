@@ -1,4 +1,4 @@
-//! `traverses/{id}/steps/{step}/odometry`: the motion to a stop by visual odometry, with what became of every corner.
+//! `traverses/{id}/steps/{step}/odometry`: the motion to a stop by visual odometry, with the fate of every corner.
 
 use axum::Json;
 use axum::extract::State;
@@ -24,7 +24,7 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
 
 /// The motion to a stop by visual odometry, with its corners
 ///
-/// The update is computed again from the images of the stop and the one before, because no drive stores the corners.
+/// The update is recomputed from the images of the stop and the previous one, because no drive stores the corners.
 #[utoipa::path(get, operation_id = "show_stop_odometry", path = ShowStopOdometry::PATH, tag = "traverses",
     responses((status = 200, body = StopOdometry), ApiError))]
 async fn show(
@@ -41,7 +41,7 @@ async fn show(
     state.tries().run_until_dropped(work).await
 }
 
-/// The motion that was measured at a stop, or why there is none.
+/// The measured motion to a stop, or the reason why there is none.
 fn measured(open: &OpenTraverse, step: usize) -> ApiResult<&MeasuredMotion> {
     if step >= open.traverse.stop_count() {
         return Err(ApiError::not_found(format!("The traverse has no step {step}.")));
@@ -54,7 +54,7 @@ fn measured(open: &OpenTraverse, step: usize) -> ApiResult<&MeasuredMotion> {
         return Err(ApiError::conflict(problem));
     }
     open.traverse.measured_motion(step).ok_or_else(|| {
-        let why = if open.driven.is_some() {
+        let why = if open.commanded.is_some() {
             "the drive went there with visual odometry off"
         } else {
             "the traverse stores none; drives on commands run it"

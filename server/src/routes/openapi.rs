@@ -1,4 +1,4 @@
-//! All routes with their description: the OpenAPI document is made from the very router that answers.
+//! All routes with their descriptions: the router that answers requests also generates the OpenAPI document.
 
 use std::sync::LazyLock;
 
@@ -56,7 +56,7 @@ static JSON: LazyLock<String> = LazyLock::new(|| {
     document.to_string()
 });
 
-/// States a largest value for every integer whose type does not.
+/// Adds a maximum to every integer whose type has none.
 fn bound_integers(part: &mut Value) {
     match part {
         Value::Array(parts) => parts.iter_mut().for_each(bound_integers),
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn every_reference_names_a_schema_and_every_problem_its_media_type() {
+    fn references_resolve_and_problems_have_a_media_type() {
         let document: Value = serde_json::from_str(&JSON).unwrap();
         for named in JSON.split("\"#/components/schemas/").skip(1) {
             let name = named.split('"').next().unwrap();

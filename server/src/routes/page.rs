@@ -1,5 +1,5 @@
-//! The page: the viewer's files, embedded in the program, or read from where `cargo xtask web` puts them while
-//! developing.
+//! The page: the viewer's files, embedded in the program, or, during development, read from the output folder of `cargo
+//! xtask web`.
 
 use axum::http::{HeaderMap, Method, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
@@ -7,13 +7,13 @@ use rust_embed::RustEmbed;
 
 use crate::problem::ApiError;
 
-/// What the page says when the viewer was not built.
+/// The page shown if the viewer was not built.
 const MISSING: &str = include_str!("missing.html");
 
-/// How the name of a compressed file ends.
+/// File extension of compressed files.
 const PACKED: &str = ".gz";
 
-/// The header with the length of a compressed file's contents.
+/// The header with the uncompressed length of a file.
 const UNPACKED_LENGTH: &str = "sightline-unpacked-length";
 
 #[derive(RustEmbed)]
@@ -21,7 +21,7 @@ const UNPACKED_LENGTH: &str = "sightline-unpacked-length";
 #[allow_missing = true]
 struct Web;
 
-/// Answers every path that is none of the API's.
+/// Answers every path outside the API.
 pub(crate) async fn serve(method: Method, uri: Uri, headers: HeaderMap) -> Response {
     if !method.is_safe() {
         return wrong_method().await.into_response();
@@ -30,7 +30,7 @@ pub(crate) async fn serve(method: Method, uri: Uri, headers: HeaderMap) -> Respo
         "/" => "index.html",
         path => path.trim_start_matches('/'),
     };
-    // Only a name that is in the list is ever opened.
+    // Only names in the list are opened.
     let is_there =
         !uri.path().starts_with("/api/") && !name.ends_with(PACKED) && Web::iter().any(|file| file == name);
     match Web::get(name).filter(|_| is_there) {
@@ -43,7 +43,7 @@ pub(crate) async fn serve(method: Method, uri: Uri, headers: HeaderMap) -> Respo
     }
 }
 
-/// A file of the page, compressed where the browser takes that; what it already has is not sent again.
+/// A file of the page, compressed if the browser accepts it; 304 if the browser has the same version.
 fn answer(name: &str, file: rust_embed::EmbeddedFile, headers: &HeaderMap) -> Response {
     let packed = Web::get(&format!("{name}{PACKED}")).filter(|_| takes_gzip(headers));
     let sent = packed.as_ref().unwrap_or(&file);
@@ -60,7 +60,7 @@ fn answer(name: &str, file: rust_embed::EmbeddedFile, headers: &HeaderMap) -> Re
     let media_type = [(header::CONTENT_TYPE, file.metadata.mimetype().to_owned())];
     match packed {
         Some(packed) => {
-            // The length of what comes out, by which the page tells how much of it has come.
+            // The uncompressed length, for the progress bar of the page.
             let unpacked = [(UNPACKED_LENGTH, file.data.len().to_string())];
             let encoding = [(header::CONTENT_ENCODING, "gzip")];
             (media_type, caching, encoding, unpacked, packed.data).into_response()
@@ -69,7 +69,7 @@ fn answer(name: &str, file: rust_embed::EmbeddedFile, headers: &HeaderMap) -> Re
     }
 }
 
-/// Whether a browser says that it takes gzip, and not with the weight 0.
+/// Whether a browser accepts gzip with a weight above 0.
 fn takes_gzip(headers: &HeaderMap) -> bool {
     let accepted = headers.get_all(header::ACCEPT_ENCODING).iter().filter_map(|value| value.to_str().ok());
     accepted.flat_map(|list| list.split(',')).any(|part| {
@@ -79,7 +79,7 @@ fn takes_gzip(headers: &HeaderMap) -> bool {
     })
 }
 
-/// The answer to a route that does not know the method.
+/// The answer to an unsupported method.
 pub(crate) async fn wrong_method() -> ApiError {
     ApiError::new(StatusCode::METHOD_NOT_ALLOWED, "method", "This route does not know that method.")
 }
@@ -89,7 +89,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn gzip_is_sent_only_to_who_takes_it() {
+    fn gzip_is_sent_only_to_clients_that_accept_it() {
         for (accepted, takes) in [
             ("gzip, deflate, br", true),
             ("br, GZIP;q=0.5", true),

@@ -1,4 +1,4 @@
-//! `…/photometry.csv`: how bright a target was at each stop, and under which angles (R136); the same for the command line.
+//! `…/photometry.csv`: brightness of a target at each stop, with the photometric angles (R136); also for the command line.
 
 use std::fmt::Write;
 use std::sync::Arc;
@@ -33,7 +33,7 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new().routes(route::<ShowPhotometry>(routes!(photometry_csv)))
 }
 
-/// The target's light over a run: level, exposure, incidence, emission and phase of every accepted update
+/// The target's illumination over a run: level, exposure, incidence, emission and phase of every accepted update
 #[utoipa::path(get, operation_id = "run_photometry_csv", path = ShowPhotometry::PATH, tag = "runs", responses((status = 200, content_type = "text/csv", body = String), ApiError))]
 async fn photometry_csv(State(state): State<AppState>, path: RunPath) -> ApiResult<Response> {
     let (settings, steps) = path.with_run(|_, run| (Arc::clone(&run.settings), run.steps.clone()))?;
@@ -47,14 +47,14 @@ async fn photometry_csv(State(state): State<AppState>, path: RunPath) -> ApiResu
     Ok(download("text/csv; charset=utf-8", &name, text))
 }
 
-/// An answer that browsers save under `name`, which is made of our own names.
+/// A download with the file name `name`, which the server composes.
 fn download(media_type: &'static str, name: &str, text: String) -> Response {
     let disposition = format!("attachment; filename=\"{name}\"");
     let headers = [(header::CONTENT_TYPE, media_type.to_owned()), (header::CONTENT_DISPOSITION, disposition)];
     (headers, text).into_response()
 }
 
-/// The designation with its left image, which a recorded step does not keep; a later step as it is.
+/// Adds the left image to the designation, because recorded steps do not store it; later steps are unchanged.
 fn with_image(traverse: &Traverse, trace: &Arc<RunStep>) -> Result<Arc<RunStep>> {
     let mut trace = Arc::clone(trace);
     let is_designation = trace.verdict().is_none() && trace.update.target.designation.step == trace.step;
@@ -67,10 +67,10 @@ fn with_image(traverse: &Traverse, trace: &Arc<RunStep>) -> Result<Arc<RunStep>>
     Ok(trace)
 }
 
-/// The light of all accepted updates of a run, as comma separated values; what is not known is empty.
+/// The illumination at all accepted updates of a run, as CSV; unknown values are empty.
 ///
 /// # Errors
-/// A simulated exposure that cannot be metered, or a cancelled one.
+/// A simulated exposure that cannot be metered, or a cancellation.
 pub(crate) fn table(
     traverse: &Traverse,
     steps: &[Arc<RunStep>],
@@ -91,7 +91,7 @@ pub(crate) fn table(
             [found.exposure_s, found.rate_per_s, found.incidence_deg, found.emission_deg, found.phase_deg]
                 .map(|value| value.map_or_else(String::new, |value| value.to_string()))
                 .join(",");
-        // Writing to a string does not fail.
+        // Writing to a string cannot fail.
         let _ = writeln!(
             text,
             "{},{},{},{optional},{}",

@@ -1,4 +1,4 @@
-//! `recordings` and `imports`: recordings on the server's machine, what they contain, and their import as drives.
+//! `recordings` and `imports`: recordings on the server's machine, their contents, and their import as drives.
 
 use axum::Json;
 use axum::extract::{Request, State};
@@ -39,7 +39,7 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
         .routes(route::<CancelImport>(routes!(cancel)))
 }
 
-/// The recordings below the folders that were named when the server was started
+/// The recordings below the folders named at the server's start
 #[utoipa::path(get, operation_id = "list_recordings", path = ListRecordings::PATH, tag = "recordings", responses(
     (status = 200, body = RecordingList), ApiError))]
 async fn list(State(state): State<AppState>) -> ApiResult<Json<RecordingList>> {
@@ -47,9 +47,9 @@ async fn list(State(state): State<AppState>) -> ApiResult<Json<RecordingList>> {
     state.pictures().run(move || Ok(Json(recordings::list(own.folders(), own.limits())))).await
 }
 
-/// What a recording contains
+/// The contents of a recording
 ///
-/// Nothing is imported; what is refused here, an import refuses, too.
+/// Imports nothing, but makes the same checks as an import.
 #[utoipa::path(get, operation_id = "show_recording", path = ShowRecording::PATH, tag = "recordings", params(RecordingPath),
     responses((status = 200, body = RecordingView), ApiError))]
 async fn contents(
@@ -64,17 +64,17 @@ async fn contents(
     state.designations().run_until_dropped(work).await
 }
 
-/// Begins to send a recording
+/// Begins the upload of a recording
 ///
-/// Its files are sent one by one, or as one zip archive; `GET recordings/contents` and `POST imports` take the folder that the
-/// answer names. What is not imported is gone when the server ends.
+/// Its files are sent one by one, or as one zip archive; `GET recordings/contents` and `POST imports` accept the folder
+/// named in the answer. Recordings that are not imported are deleted when the server ends.
 #[utoipa::path(post, operation_id = "begin_upload", path = BeginUpload::PATH, tag = "recordings",
     responses((status = 201, body = UploadView), ApiError))]
 async fn begin_upload(State(state): State<AppState>) -> ApiResult<(StatusCode, Json<UploadView>)> {
     blocking(move || Ok((StatusCode::CREATED, Json(state.uploads().begin(state.folders())?)))).await
 }
 
-/// Sends a file of a recording
+/// Uploads a file of a recording
 #[utoipa::path(put, operation_id = "send_file", path = SendFile::PATH, tag = "recordings", params(UploadPath),
     request_body(content = FileBytes, content_type = "application/octet-stream"),
     responses((status = 200, body = UploadView), ApiError))]
@@ -84,10 +84,10 @@ async fn send_file(
     Params(UploadPath { path }): Params<SendFile>,
     request: Request,
 ) -> ApiResult<Json<UploadView>> {
-    Ok(Json(state.uploads().upload(&upload)?.keep(&path, request.into_body()).await?))
+    Ok(Json(state.uploads().upload(&upload)?.store_file(&path, request.into_body()).await?))
 }
 
-/// Sends a recording as one zip archive
+/// Uploads a recording as one zip archive
 #[utoipa::path(put, operation_id = "send_archive", path = SendArchive::PATH, tag = "recordings",
     request_body(content = FileBytes, content_type = "application/octet-stream"),
     responses((status = 200, body = UploadView), ApiError))]
@@ -99,7 +99,7 @@ async fn send_archive(
     Ok(Json(state.uploads().upload(&upload)?.unpack(request.into_body()).await?))
 }
 
-/// Removes a recording that was sent
+/// Removes an uploaded recording
 #[utoipa::path(delete, operation_id = "remove_upload", path = RemoveUpload::PATH, tag = "recordings",
     responses((status = 204), ApiError))]
 async fn remove_upload(
@@ -111,7 +111,7 @@ async fn remove_upload(
 
 /// Imports a recording as a drive
 ///
-/// The drive stays open across restarts. A drive in the native format is opened where it is.
+/// The drive stays open across restarts. A drive in the native format is opened in place.
 #[utoipa::path(post, operation_id = "start_import", path = StartImport::PATH, tag = "recordings",
     request_body = NewImport, responses((status = 202, body = ImportJob), ApiError))]
 async fn start(State(state): State<AppState>, Body(new): Body<StartImport>) -> ApiResult<Response> {
@@ -124,7 +124,7 @@ async fn start(State(state): State<AppState>, Body(new): Body<StartImport>) -> A
     Ok((StatusCode::ACCEPTED, location, Json(job)).into_response())
 }
 
-/// How far an import is
+/// The progress of an import
 #[utoipa::path(get, operation_id = "show_import", path = ShowImport::PATH, tag = "recordings",
     responses((status = 200, body = ImportJob), ApiError))]
 async fn show(
@@ -134,7 +134,7 @@ async fn show(
     Ok(Json(state.imports().view(&import)?))
 }
 
-/// Cancels an import; nothing of it is kept
+/// Cancels an import and removes its files
 #[utoipa::path(post, operation_id = "cancel_import", path = CancelImport::PATH, tag = "recordings",
     responses((status = 200, body = ImportJob), ApiError))]
 async fn cancel(

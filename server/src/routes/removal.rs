@@ -1,4 +1,4 @@
-//! Removing sessions, runs and drives, and taking the removal of sessions, targets and runs back.
+//! Removes sessions, runs and drives, and restores removed sessions, targets and runs.
 
 use std::sync::Arc;
 
@@ -15,8 +15,8 @@ use sightline_session::view::SessionView;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
-use crate::brought;
 use crate::extract::{Path, RunPath, TargetPath};
+use crate::import_session;
 use crate::jobs::blocking;
 use crate::live_session::LiveSession;
 use crate::problem::{ApiError, ApiResult};
@@ -37,7 +37,7 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
 
 /// Removes a session
 ///
-/// Its runs end. The last 16 removed sessions can be restored until the server ends.
+/// Its runs are cancelled. The last 16 removed sessions can be restored until the server ends.
 #[utoipa::path(delete, operation_id = "remove_session", path = RemoveSession::PATH, tag = "sessions", responses((status = 204), ApiError))]
 async fn remove_session(
     State(state): State<AppState>,
@@ -46,7 +46,7 @@ async fn remove_session(
     blocking(move || state.remove_session(&session).map(|()| StatusCode::NO_CONTENT)).await
 }
 
-/// Takes the removal of a session back; its runs are computed again
+/// Restores a removed session; its runs are recomputed
 #[utoipa::path(post, operation_id = "restore_session", path = RestoreSession::PATH, tag = "sessions", responses((status = 200, body = SessionView), ApiError))]
 async fn restore_session(
     State(state): State<AppState>,
@@ -59,10 +59,10 @@ async fn restore_session(
     .await
 }
 
-/// Removes a drive that was opened by its scenario
+/// Removes a drive that was opened from a scenario
 ///
-/// Its folder with the rendered images is deleted. A drive with sessions, or one that was given when the server was started,
-/// is refused (409). The same scenario opens it again.
+/// Deletes its folder with the rendered images. Refused (409) for a drive with sessions, or one given at the server's start.
+/// The same scenario opens the drive again.
 #[utoipa::path(delete, operation_id = "remove_traverse", path = RemoveTraverse::PATH, tag = "traverses", responses((status = 204), ApiError))]
 async fn remove_traverse(
     State(state): State<AppState>,
@@ -73,10 +73,10 @@ async fn remove_traverse(
         return Err(ApiError::conflict(format!("The drive {id} was given when the server was started."))
             .hint("Start the server without it."));
     }
-    blocking(move || brought::remove(&state, &open).map(|()| StatusCode::NO_CONTENT)).await
+    blocking(move || import_session::remove_traverse(&state, &open).map(|()| StatusCode::NO_CONTENT)).await
 }
 
-/// Removes a run; its number is not used again, and what left it keeps the steps that both share
+/// Removes a run; its number is not reused, and runs forked from it keep the shared steps
 #[utoipa::path(delete, operation_id = "remove_run", path = RemoveRun::PATH, tag = "runs", responses((status = 200, body = SessionView), ApiError))]
 async fn remove_run(
     State(state): State<AppState>,
@@ -91,7 +91,7 @@ async fn remove_run(
         };
         state.change_and(&live, remove, |is_needed| {
             if !is_needed {
-                live.tell_to_end(target, Some(run));
+                live.cancel_runs(target, Some(run));
             }
         })?;
         Ok(Json(state.view(&live)))
@@ -99,7 +99,7 @@ async fn remove_run(
     .await
 }
 
-/// Takes the removal of a run back
+/// Restores a removed run
 #[utoipa::path(post, operation_id = "restore_run", path = RestoreRun::PATH, tag = "runs", responses((status = 200, body = SessionView), ApiError))]
 async fn restore_run(
     State(state): State<AppState>,
@@ -108,7 +108,7 @@ async fn restore_run(
     blocking(move || restored(&state, &live, target, |session| Ok(session.restore_run(target, run)?))).await
 }
 
-/// Takes the removal of a target back
+/// Restores a removed target
 #[utoipa::path(post, operation_id = "restore_target", path = RestoreTarget::PATH, tag = "targets", responses((status = 200, body = SessionView), ApiError))]
 async fn restore_target(
     State(state): State<AppState>,
@@ -123,7 +123,7 @@ async fn restore_target(
     .await
 }
 
-/// Takes a removal back and lets the runs of its target go on.
+/// Restores a run or target, and continues the runs of the target.
 fn restored(
     state: &AppState,
     live: &Arc<LiveSession>,
@@ -131,6 +131,6 @@ fn restored(
     restore: impl FnOnce(&mut Session) -> ApiResult<()>,
 ) -> ApiResult<Json<SessionView>> {
     state.change(live, |session| restore(session).map_err(ApiError::about_path))?;
-    state.runner().go_on_with(live, target)?;
+    state.runner().resume_target(live, target)?;
     Ok(Json(state.view(live)))
 }

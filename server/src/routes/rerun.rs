@@ -1,7 +1,7 @@
-//! `…/rerun`: a session as a live Rerun recording, behind the same token and on the same port as everything else.
+//! `…/rerun`: a session as a live Rerun recording, with the same token and on the same port as everything else.
 //!
-//! Rerun's own stream (gRPC) has no token and no check of its Host, takes messages from everybody, and its address has no
-//! place for a path. Its viewer also reads recordings over HTTP while they arrive, which is what these routes send.
+//! Rerun's own stream (gRPC) has no token and does not check its Host, accepts messages from any sender, and its address
+//! cannot contain a path. Its viewer also reads recordings over HTTP while they grow, which these routes serve.
 
 use std::convert::Infallible;
 use std::sync::{Arc, Mutex};
@@ -22,7 +22,7 @@ use tokio::sync::broadcast::error::RecvError;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
-use crate::driven;
+use crate::commanded_drive;
 use crate::extract::{Path, SessionPath};
 use crate::jobs::{blocking, lock};
 use crate::live_session::LiveSession;
@@ -58,7 +58,7 @@ async fn open(State(state): State<AppState>, SessionPath(live): SessionPath) -> 
 
 /// Closes the live Rerun stream of a session
 ///
-/// Its viewers keep what they have read.
+/// Viewers keep the data received so far.
 #[utoipa::path(delete, operation_id = "close_recording", path = CloseRecording::PATH, tag = "exports", responses((status = 204), ApiError))]
 async fn close(State(state): State<AppState>, SessionPath(live): SessionPath) -> ApiResult<StatusCode> {
     let not_open = || ApiError::not_found("This session is not streamed to Rerun.");
@@ -67,7 +67,7 @@ async fn close(State(state): State<AppState>, SessionPath(live): SessionPath) ->
 
 /// The live Rerun stream of a session
 ///
-/// An `.rrd` file without an end: it has all steps so far, and each further step when it is computed.
+/// An endless `.rrd` file: all steps so far, and each further step when it is computed.
 #[utoipa::path(get, operation_id = "read_recording", path = ReadRecording::PATH, tag = "exports",
     responses((status = 200, content_type = "application/octet-stream", body = FileBytes), ApiError))]
 async fn read(State(state): State<AppState>, SessionPath(live): SessionPath) -> ApiResult<Response> {
@@ -82,7 +82,7 @@ async fn read(State(state): State<AppState>, SessionPath(live): SessionPath) -> 
     });
     let headers = [
         (header::CONTENT_TYPE, "application/octet-stream"),
-        // A proxy that gathers the answer would hold the newest step back.
+        // A buffering proxy would delay the newest step.
         (header::HeaderName::from_static("x-accel-buffering"), "no"),
     ];
     Ok((headers, Body::from_stream(bytes)).into_response())
@@ -96,7 +96,7 @@ async fn viewer_file(Path(AtViewerFile { file }): Path<ShowRerunViewer>) -> ApiR
     found.ok_or_else(|| ApiError::not_found("The viewer has no such file."))
 }
 
-/// One viewer that reads a session. The next bytes are computed when the connection can take them.
+/// One viewer of a session. The next bytes are computed when the connection can accept them.
 struct Reader {
     live: Arc<LiveSession>,
     recording: Arc<Mutex<LiveRecording>>,
@@ -105,7 +105,7 @@ struct Reader {
 }
 
 impl Reader {
-    /// The next bytes, as soon as the session has something new; `None` when the stream is closed.
+    /// The next bytes, as soon as the session has changed; `None` when the stream is closed.
     async fn next(&mut self) -> Option<Vec<u8>> {
         let closed = self.viewing.closed.clone();
         while !closed.is_cancelled() {
@@ -126,19 +126,19 @@ impl Reader {
         None
     }
 
-    /// Logs the next steps; their bytes are empty when the recording is up to date.
+    /// Logs the next steps; the result is empty if the recording is up to date.
     async fn advance(&self) -> ApiResult<Vec<u8>> {
         let (live, recording) = (Arc::clone(&self.live), Arc::clone(&self.recording));
         blocking(move || {
             let (session, open) = (live.with(|session| session.clone()), live.traverse());
             let traverse = &open.traverse;
-            let drive = driven::log(&live);
+            let drive = commanded_drive::log(&live);
             Ok(lock(&recording).advance(&traverse.index().name, traverse, &session, drive.as_ref())?)
         })
         .await
     }
 
-    /// Waits until the session may have changed; false when the session is gone.
+    /// Waits until the session may have changed; false if the session was removed.
     async fn changed(&mut self) -> bool {
         loop {
             match self.events.recv().await {

@@ -1,4 +1,4 @@
-//! Registers a handler for an endpoint: method and path are those of the type.
+//! Registers a handler for an endpoint; method and path are defined by the endpoint type.
 
 use axum::http::header::{self, HeaderName};
 use sightline_api::endpoint::{self, Endpoint, Method};
@@ -12,7 +12,7 @@ use crate::idempotency;
 use crate::problem::ApiError;
 use crate::state::AppState;
 
-/// The handler that `routes!` describes, as the route of `E`; its description gains the names in the path.
+/// The handler described by `routes!`, as the route of `E`; adds the path parameters to its description.
 ///
 /// # Panics
 /// A handler that declares another method or path than `E`.
@@ -31,7 +31,7 @@ pub(crate) fn route<E: Endpoint<At: IntoParams>>(
         };
         let of_path = E::At::into_params(|| Some(ParameterIn::Path)).into_iter();
         let mut all: Vec<_> = of_path.filter(|parameter| is_missing(&parameter.name)).collect();
-        // The names say it all; the documents of the fields are for readers of the sources.
+        // The names are sufficient; the doc comments of the fields are for developers.
         all.iter_mut().for_each(|parameter| parameter.description = None);
         let mut all: Vec<_> = all.into_iter().map(RefOr::T).collect();
         all.extend(declared);
@@ -39,7 +39,7 @@ pub(crate) fn route<E: Endpoint<At: IntoParams>>(
             all.push(RefOr::T(idempotency::parameter()));
         }
         operation.parameters = (!all.is_empty()).then_some(all);
-        // The guard before every handler refuses with a problem.
+        // The guard in front of every handler may answer with a problem.
         for (status, response) in ApiError::responses() {
             operation.responses.responses.entry(status).or_insert(response);
         }
@@ -53,11 +53,11 @@ type NamedSchema = (String, RefOr<utoipa::openapi::Schema>);
 
 #[cfg(test)]
 thread_local! {
-    /// The schemas of the routes that this thread registered, also those that others of their name replaced.
+    /// The schemas of the routes registered by this thread, including those replaced by others of the same name.
     static SCHEMAS: std::cell::RefCell<Vec<NamedSchema>> = const { std::cell::RefCell::new(Vec::new()) };
 }
 
-/// The schemas of all routes that this thread registered.
+/// The schemas of all routes registered by this thread.
 #[cfg(test)]
 pub(super) fn schemas_of_all_routes() -> Vec<NamedSchema> {
     SCHEMAS.take()
@@ -73,10 +73,10 @@ fn operation(item: &mut PathItem, method: Method) -> Option<&mut Operation> {
     }
 }
 
-/// The header that names the resource of `E` at this location.
+/// The header with the path of the resource of `E` at this location.
 pub(crate) fn location<E: Endpoint>(at: &E::At) -> [(HeaderName, String); 1] {
     let path = endpoint::path::<E>(at, &E::Query::default());
-    // Defaults of query parameters are no part of the name.
+    // Defaults of query parameters are not part of the path.
     let name = path.split('?').next().unwrap_or_default();
     [(header::LOCATION, format!("/api/v1/{name}"))]
 }

@@ -1,4 +1,4 @@
-//! `…/targets/{target}/runs`: running a target again from a step, cancelling and resuming.
+//! `…/targets/{target}/runs`: forks, cancels and resumes runs.
 
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ use crate::live_session::LiveSession;
 use crate::problem::{ApiError, ApiResult};
 use crate::revision;
 use crate::routes::route::{location, route};
-use crate::routes::targets::start_or_say;
+use crate::routes::targets::start_or_fail;
 use crate::routes::what_if;
 use crate::runner;
 use crate::state::AppState;
@@ -38,10 +38,10 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
         .routes(route::<ResumeRun>(routes!(resume)))
 }
 
-/// Runs a target again from a step with changed settings
+/// Forks a run of a target at a step, with changed settings
 ///
-/// Nothing is overwritten: a new run shares the steps before that one. From the designation's own step on,
-/// the target is designated anew.
+/// Nothing is overwritten: the new run shares the earlier steps. At the step of the designation, the target is designated
+/// again.
 #[utoipa::path(post, operation_id = "fork_run", path = ForkRun::PATH, tag = "runs", request_body = NewRun, responses((status = 202, body = RunView), ApiError))]
 async fn fork(
     State(state): State<AppState>,
@@ -54,9 +54,9 @@ async fn fork(
     state.designations().run_until_dropped(move |cancel| add(&work_state, &live, target, &new, cancel)).await
 }
 
-/// A run so far
+/// A run with its steps so far
 ///
-/// The answer has an ETag; `If-None-Match` with it is answered by 304 while the run is the same.
+/// The answer has an ETag; with a matching `If-None-Match` the answer is 304.
 #[utoipa::path(get, operation_id = "show_run", path = ShowRun::PATH, tag = "runs", params(FirstRow,
     ("If-None-Match" = Option<String>, Header, description = "The ETag of the answer that you have")),
     responses((status = 200, body = RunView, headers(("etag" = String, description = "Changes with the answer"))),
@@ -86,15 +86,15 @@ async fn cancel(
         if before.complete || before.stopped.is_some() {
             return Err(ApiError::conflict("The run has ended already."));
         }
-        // Told under the session's lock, so that no step is recorded after this.
-        let tell = |(): &()| live.tell_to_end(target, Some(run));
+        // Cancels while the session is locked, so that no step is recorded afterwards.
+        let tell = |(): &()| live.cancel_runs(target, Some(run));
         state.change_and(&live, |session| Ok(session.cancel(target, run)?), tell)?;
         Ok(Json(view(&state, &live, target, run)?))
     })
     .await
 }
 
-/// Lets a stopped run go on
+/// Resumes a stopped run
 #[utoipa::path(post, operation_id = "resume_run", path = ResumeRun::PATH, tag = "runs", responses((status = 202, body = RunView), ApiError))]
 async fn resume(
     State(state): State<AppState>,
@@ -105,13 +105,13 @@ async fn resume(
             return Err(ApiError::conflict("The run was not stopped."));
         }
         state.change(&live, |session| Ok(session.resume(target, run)?))?;
-        start_or_say(&state, &live, target, run);
+        start_or_fail(&state, &live, target, run);
         Ok((StatusCode::ACCEPTED, Json(view(&state, &live, target, run)?)))
     })
     .await
 }
 
-/// Adds the run, unless the request went away while its target was designated anew.
+/// Adds the run, unless the request was dropped while its target was designated again.
 fn add(
     state: &AppState,
     live: &Arc<LiveSession>,
@@ -143,7 +143,7 @@ fn add(
     };
     let run = state.change(live, |session| {
         has_room(session, target, &state.limits().runs)?;
-        // A run again from the very step at which its parent was displaced is displaced alike, unless it says where.
+        // A fork at the step at which its parent was displaced inherits the displacement, unless the request specifies one.
         let inherited = session.run(target, new.run)?.displaced_at(new.from_step);
         let run = session.fork(target, new.run, new.from_step, &new.settings, redesignated)?;
         if let Some(pixel) = new.prediction_px.or(inherited) {
@@ -151,7 +151,7 @@ fn add(
         }
         Ok(run)
     })?;
-    start_or_say(state, live, target, run);
+    start_or_fail(state, live, target, run);
     let location = location::<ShowRun>(&AtRun { session: live.id.clone(), target, run });
     Ok((StatusCode::ACCEPTED, location, Json(view(state, live, target, run)?)).into_response())
 }
@@ -164,12 +164,12 @@ fn has_room(session: &Session, target: usize, limit: &Limit) -> ApiResult<()> {
     Err(ApiError::conflict(format!("A target may have at most {most} runs.")).hint(limit.raise()))
 }
 
-/// The run that the path names.
+/// The run named in the path.
 fn view(state: &AppState, live: &LiveSession, target: usize, run: usize) -> ApiResult<RunView> {
     view_from(state, live, target, run, 0)
 }
 
-/// That run with its rows from one on.
+/// The run named in the path, with its rows starting at `from`.
 fn view_from(
     state: &AppState,
     live: &LiveSession,

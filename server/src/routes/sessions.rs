@@ -1,4 +1,4 @@
-//! `sessions`: a person's work on a traverse, and its cursor.
+//! `sessions`: a user's work on a traverse, and its cursor.
 
 use axum::Json;
 use axum::extract::State;
@@ -16,9 +16,9 @@ use sightline_session::view::SessionView;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
-use crate::brought;
 use crate::cancel::CancelFlag;
 use crate::extract::{Body, SessionPath};
+use crate::import_session;
 use crate::jobs::blocking;
 use crate::live_session::LiveSession;
 use crate::problem::{ApiError, ApiResult};
@@ -30,7 +30,7 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
         .routes(route::<ListSessions>(routes!(list)))
         .routes(route::<BeginSession>(routes!(begin)))
-        .routes(route::<BringSession>(routes!(bring)))
+        .routes(route::<BringSession>(routes!(import_session)))
         .routes(route::<ShowSession>(routes!(show)))
         .routes(route::<ShowCursor>(routes!(show_cursor)))
         .routes(route::<MoveCursor>(routes!(move_cursor)))
@@ -60,7 +60,7 @@ fn entry(live: &LiveSession) -> SessionEntry {
         step,
         stop_count: traverse.stop_count(),
         used: used.map(|used| used.to_string()),
-        // A clock that was set back has nothing in the future.
+        // If the clock was set back, the time would be negative.
         idle_s: used.map(|used| jiff::Timestamp::now().duration_since(used).as_secs_f64().max(0.0)),
     }
 }
@@ -75,23 +75,23 @@ async fn begin(State(state): State<AppState>, Body(new): Body<BeginSession>) -> 
     })?;
     blocking(move || {
         let live = state.begin_session(traverse)?;
-        state.look_at(&live.traverse(), 0);
+        state.prefetch_from(&live.traverse(), 0);
         let location = location::<ShowSession>(&AtSession { session: live.id.clone() });
         Ok((StatusCode::CREATED, location, Json(state.view(&live))).into_response())
     })
     .await
 }
 
-/// Begins a session as it was elsewhere, from an exported `reproduce.json`
+/// Creates a session from an exported `reproduce.json`
 ///
-/// A simulated drive comes with its scenario; a recorded one must be open already. Targets, runs, breakpoints, cursor and
-/// notes are as they were, and the runs are computed again.
+/// The file contains the scenario of a simulated drive; a recorded drive must already be open. Targets, runs, breakpoints,
+/// cursor and notes are restored, and the runs are recomputed.
 #[utoipa::path(post, operation_id = "bring_session", path = BringSession::PATH, tag = "sessions", request_body = Reproduction, responses(
     (status = 201, body = SessionView), ApiError))]
-async fn bring(State(state): State<AppState>, Body(new): Body<BringSession>) -> ApiResult<Response> {
+async fn import_session(State(state): State<AppState>, Body(new): Body<BringSession>) -> ApiResult<Response> {
     let work_state = state.clone();
     let work = move |cancel: &CancelFlag| {
-        let live = brought::bring(&work_state, new, cancel)?;
+        let live = import_session::import_session(&work_state, new, cancel)?;
         let location = location::<ShowSession>(&AtSession { session: live.id.clone() });
         Ok((StatusCode::CREATED, location, Json(work_state.view(&live))).into_response())
     };
@@ -105,7 +105,7 @@ async fn show(State(state): State<AppState>, SessionPath(live): SessionPath) -> 
     Ok(Json(state.view(&live)))
 }
 
-/// What is looked at
+/// The selection
 #[utoipa::path(get, operation_id = "show_cursor", path = ShowCursor::PATH, tag = "sessions", responses((status = 200, body = Cursor), ApiError))]
 async fn show_cursor(SessionPath(live): SessionPath) -> ApiResult<Json<Cursor>> {
     Ok(Json(live.with(|session| session.cursor)))
@@ -124,8 +124,8 @@ async fn move_cursor(
             session.move_cursor(cursor).map(|()| before)
         })?;
         if before != cursor {
-            state.look_at(&live.traverse(), cursor.step);
-            state.cursor_moved(&live, cursor);
+            state.prefetch_from(&live.traverse(), cursor.step);
+            state.move_cursor(&live, cursor);
         }
         Ok(Json(cursor))
     })

@@ -1,4 +1,4 @@
-//! `…/runs/{run}/steps`: the record of a step, its arrays, and its view against the earlier templates of the run.
+//! `…/runs/{run}/steps`: the record of a step, its arrays, and the comparison of its view with earlier templates of the run.
 
 use axum::Json;
 use axum::extract::State;
@@ -21,7 +21,7 @@ use crate::routes::route::route;
 use crate::routes::traverses::FileBytes;
 use crate::state::AppState;
 
-/// How many of the newest templates of a run a view is compared with, besides the designated one.
+/// Maximum number of newest templates with which a view is compared, in addition to the designated one.
 const EARLIER_LIMIT: usize = 40;
 
 /// The routes of this resource.
@@ -35,21 +35,21 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
 
 /// A step
 ///
-/// Arrays are left out; they are fetched together in one file.
+/// Without arrays, which are available together in one file.
 #[utoipa::path(get, operation_id = "show_step", path = ShowStep::PATH, tag = "steps", responses((status = 200, body = RunStep), ApiError))]
 async fn show(step: RecordedStep) -> ApiResult<Response> {
     blocking(move || Ok(Json(step.recorded.as_ref()).into_response())).await
 }
 
-/// What the stages of a step take
+/// The durations of a step's stages
 ///
-/// On Mars, by the model of the papers' processor of 20 MHz; on this machine, as measured when the step was computed.
+/// On Mars, according to the model of the papers' 20 MHz processor; on this machine, as measured when the step was computed.
 #[utoipa::path(get, operation_id = "show_times", path = ShowTimes::PATH, tag = "steps", responses((status = 200, body = Vec<StageTime>), ApiError))]
 async fn times(step: RecordedStep) -> ApiResult<Json<Vec<StageTime>>> {
     blocking(move || Ok(Json(step.times()))).await
 }
 
-/// All arrays to which a step came, as one NumPy file (`numpy.load` gives them by name); NaN where invalid
+/// All arrays of a step as one NumPy file (`numpy.load` returns them by name); invalid values are NaN
 #[utoipa::path(get, operation_id = "show_arrays", path = ShowArrays::PATH,
     tag = "steps", responses((status = 200, content_type = "application/octet-stream", body = FileBytes), ApiError))]
 async fn arrays(step: RecordedStep) -> ApiResult<Response> {
@@ -64,11 +64,11 @@ async fn arrays(step: RecordedStep) -> ApiResult<Response> {
     .await
 }
 
-/// The view of a step against the earlier templates of its run, oldest first
+/// Compares the view of a step with the earlier templates of its run, oldest first
 ///
-/// Each template is prepared by the geometry from its own stop and searched near the position that the step found: the offsets are the
-/// drift that the renewals between have added up. Of many templates the designated one and the newest are compared; the list is
-/// empty where the step found no position.
+/// Each template is transformed from its own stop by the known geometry and searched near the located position: the offsets
+/// are the drift accumulated by template renewals. If there are many templates, the designated one and the newest ones are
+/// compared; the list is empty if the step located no position.
 #[utoipa::path(get, operation_id = "show_earlier_templates", path = ShowEarlierTemplates::PATH, tag = "steps",
     responses((status = 200, body = Vec<AgainstEarlier>), ApiError))]
 async fn earlier_templates(
@@ -78,7 +78,7 @@ async fn earlier_templates(
     state.tries().run(move || Ok(Json(step.against_earlier(EARLIER_LIMIT)?))).await
 }
 
-/// Rows and columns, as NumPy counts them.
+/// Rows and columns, the shape in NumPy.
 fn shape_of(view: ArrayView<'_>) -> [u32; 2] {
     let [width, height] = view.size();
     [height, width]

@@ -24,7 +24,7 @@ use crate::routes::route::{location, route};
 use crate::state::AppState;
 use crate::study::order::order;
 
-/// What the report may do: show itself.
+/// The content security policy of the report: it may only display itself.
 const REPORT_POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; \
                              form-action 'none'; frame-ancestors 'self'; sandbox";
 
@@ -58,7 +58,7 @@ async fn list(State(state): State<AppState>) -> Json<Vec<StudyJob>> {
 
 /// Starts a study
 ///
-/// What is kept of an earlier one with the same worlds, configurations and points is not done again.
+/// Results of an earlier study with the same worlds, configurations and points are reused.
 #[utoipa::path(post, operation_id = "start_study", path = StartStudy::PATH, tag = "studies", request_body = NewStudy,
     responses((status = 202, body = StudyJob), ApiError))]
 async fn start(State(state): State<AppState>, Body(new): Body<StartStudy>) -> ApiResult<Response> {
@@ -71,17 +71,17 @@ async fn start(State(state): State<AppState>, Body(new): Body<StartStudy>) -> Ap
     Ok((StatusCode::ACCEPTED, location, Json(job)).into_response())
 }
 
-/// How a study stands
+/// The state of a study
 #[utoipa::path(get, operation_id = "show_study_job", path = ShowStudyJob::PATH, tag = "studies",
     responses((status = 200, body = StudyJob), ApiError))]
 async fn show(
     State(state): State<AppState>,
     extract::Path(AtStudyJob { job }): extract::Path<ShowStudyJob>,
 ) -> ApiResult<Json<StudyJob>> {
-    Ok(Json(state.studies().work(&job)?.view()))
+    Ok(Json(state.studies().study(&job)?.view()))
 }
 
-/// Stops a study; what it found is kept
+/// Stops a study; its results are kept
 #[utoipa::path(post, operation_id = "cancel_study", path = CancelStudy::PATH, tag = "studies",
     responses((status = 200, body = StudyJob), ApiError))]
 async fn cancel(
@@ -91,7 +91,7 @@ async fn cancel(
     Ok(Json(state.studies().cancel(&job)?))
 }
 
-/// Lets a stopped study go on
+/// Resumes a stopped study
 #[utoipa::path(post, operation_id = "resume_study", path = ResumeStudy::PATH, tag = "studies",
     responses((status = 202, body = StudyJob), ApiError))]
 async fn resume(
@@ -101,24 +101,24 @@ async fn resume(
     Ok((StatusCode::ACCEPTED, Json(state.studies().resume(&job)?)))
 }
 
-/// The table of a study, as far as it is
+/// The table of a study, as far as computed
 #[utoipa::path(get, operation_id = "study_rows", path = ShowStudyRows::PATH, tag = "studies",
     responses((status = 200, body = StudyRows), ApiError))]
 async fn rows(
     State(state): State<AppState>,
     extract::Path(AtStudyJob { job }): extract::Path<ShowStudyRows>,
 ) -> ApiResult<Json<StudyRows>> {
-    Ok(Json(StudyRows { rows: state.studies().work(&job)?.rows() }))
+    Ok(Json(StudyRows { rows: state.studies().study(&job)?.rows() }))
 }
 
-/// The report of a study that is done, a page that needs no other
+/// The report of a finished study, a self-contained page
 #[utoipa::path(get, operation_id = "study_report", path = ShowStudyReport::PATH, tag = "studies",
     responses((status = 200, content_type = "text/html", body = String), ApiError))]
 async fn report(
     State(state): State<AppState>,
     extract::Path(AtStudyJob { job }): extract::Path<ShowStudyReport>,
 ) -> ApiResult<Response> {
-    let report = state.studies().work(&job)?.report();
+    let report = state.studies().study(&job)?.report();
     let report =
         report.ok_or_else(|| ApiError::conflict("The study is not done, so that it has no report."))?;
     let headers = [

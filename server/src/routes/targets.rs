@@ -1,4 +1,4 @@
-//! `sessions/{session}/targets`: designating, renaming and removing targets.
+//! `sessions/{session}/targets`: designates, renames and removes targets.
 
 use std::sync::Arc;
 
@@ -37,7 +37,7 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
 
 /// Designates a target
 ///
-/// The designation is computed before the answer; the steps after it follow in the background.
+/// The designation is computed before the answer; the later steps follow in the background.
 #[utoipa::path(post, operation_id = "designate_target", path = DesignateTarget::PATH, tag = "targets", request_body = NewTarget, responses((status = 201, body = Designated), ApiError))]
 async fn designate(
     State(state): State<AppState>,
@@ -50,7 +50,7 @@ async fn designate(
     state.designations().run_until_dropped(move |cancel| add(&work_state, &live, new, settings, cancel)).await
 }
 
-/// Whether a label is short enough.
+/// Checks the length of a label.
 ///
 /// # Errors
 /// A problem that names the field and the limit.
@@ -80,7 +80,7 @@ async fn rename(
     .await
 }
 
-/// Removes a target; its number is not used again
+/// Removes a target; its number is not reused
 #[utoipa::path(delete, operation_id = "remove_target", path = RemoveTarget::PATH, tag = "targets", responses((status = 200, body = SessionView), ApiError))]
 async fn remove(
     State(state): State<AppState>,
@@ -90,13 +90,13 @@ async fn remove(
         let remove = |session: &mut Session| {
             session.remove_target(target).map_err(|error| ApiError::from(error).about_path())
         };
-        state.change_and(&live, remove, |()| live.tell_to_end(target, None))?;
+        state.change_and(&live, remove, |()| live.cancel_runs(target, None))?;
         Ok(Json(state.view(&live)))
     })
     .await
 }
 
-/// Computes the designation and adds its target, unless the request went away meanwhile.
+/// Computes the designation and adds its target, unless the request was dropped in the meantime.
 fn add(
     state: &AppState,
     live: &Arc<LiveSession>,
@@ -116,8 +116,8 @@ fn add(
         has_number(session, limits)?;
         Ok(session.add_target(new.label, settings, first))
     })?;
-    state.look_at(&live.traverse(), designation.step);
-    start_or_say(state, live, target, 0);
+    state.prefetch_from(&live.traverse(), designation.step);
+    start_or_fail(state, live, target, 0);
     let at = AtTarget { session: live.id.clone(), target };
     Ok((
         StatusCode::CREATED,
@@ -127,10 +127,10 @@ fn add(
         .into_response())
 }
 
-/// Whether a session may have another target.
+/// Checks the number of targets before another one is added.
 ///
 /// # Errors
-/// A problem when it has too many.
+/// A problem if there are too many.
 pub(crate) fn has_room(session: &Session, limits: &Limits) -> ApiResult<()> {
     let most = limits.targets.count();
     if session.target_count() < most {
@@ -140,7 +140,7 @@ pub(crate) fn has_room(session: &Session, limits: &Limits) -> ApiResult<()> {
     Err(ApiError::conflict(detail).hint(limits.targets.hint("Remove one that is not needed.")))
 }
 
-/// Whether a session may have another target with a number of its own.
+/// Checks the numbers of targets, including removed ones, before another one is added.
 fn has_number(session: &Session, limits: &Limits) -> ApiResult<()> {
     has_room(session, limits)?;
     let most = limits.target_numbers.count();
@@ -151,10 +151,10 @@ fn has_number(session: &Session, limits: &Limits) -> ApiResult<()> {
     Err(ApiError::conflict(detail).hint(limits.target_numbers.hint("Begin another session.")))
 }
 
-/// Continues a run; when too much is waiting, the run says so and can be resumed.
-pub(crate) fn start_or_say(state: &AppState, live: &Arc<LiveSession>, target: usize, run: usize) {
+/// Continues a run; if the queue is full, the run reports this and can be resumed.
+pub(crate) fn start_or_fail(state: &AppState, live: &Arc<LiveSession>, target: usize, run: usize) {
     if let Err(busy) = state.runner().start(live, target, run) {
-        // The target may have been removed meanwhile.
+        // The target may have been removed in the meantime.
         let _ = live.with(|session| session.fail(target, run, busy.problem().detail.clone()));
     }
 }

@@ -1,8 +1,8 @@
-//! `…/steps/{step}/trackability`: how well a target would do at each place of a left image, before one is picked.
+//! `…/steps/{step}/trackability`: predicted quality of a target at each position of a left image, before designation.
 //!
-//! A map is made in the background when it is first asked for, row by row, one at a time; whoever asks meanwhile gets the rows
-//! that are there. It is a function of the images, so that keeping it changes nothing but the time. What is kept is limited:
-//! the newest maps, and fewer of the surfaces behind them, which are larger.
+//! The first request starts a map, which is computed in the background row by row, one map at a time; requests in the
+//! meantime get the finished rows. A map is a function of the images, so caching it saves only time. The cache is limited to
+//! the newest maps, and fewer of the underlying surfaces, which are larger.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -31,10 +31,10 @@ use crate::problem::{ApiError, ApiResult};
 use crate::rendering::OpenTraverse;
 use crate::routes::route::route;
 use crate::state::AppState;
-use crate::trackability_maps::Making;
+use crate::trackability_maps::MapJob;
 
-/// How often pages are told of new rows.
-const TOLD_EVERY: Duration = Duration::from_millis(150);
+/// Minimum interval of progress events.
+const REPORT_INTERVAL: Duration = Duration::from_millis(150);
 
 /// The routes of this resource.
 pub(crate) fn router() -> OpenApiRouter<AppState> {
@@ -48,9 +48,9 @@ fn limits(text: Option<&str>) -> ApiResult<TrackabilityLimits> {
     Ok(TrackabilityLimits::parse(text.unwrap_or_default())?)
 }
 
-/// The trackability of a stop's left image, as far as it was made
+/// The trackability of a stop's left image, as far as computed
 ///
-/// Asking for it begins it; rows follow in the background, told by the event `trackability_progress`.
+/// The first request starts the computation; the event `trackability_progress` announces further rows.
 #[utoipa::path(get, operation_id = "show_trackability", path = ShowTrackability::PATH, tag = "trackability",
     params(MapLimits),
     responses((status = 200, body = MapProgress), ApiError))]
@@ -61,20 +61,20 @@ async fn show(
 ) -> ApiResult<Json<MapProgress>> {
     let limits = limits(params.limits.as_deref())?;
     let open = stop(&state, &id, step)?;
-    let (making, is_new) = state.maps().find_or_begin(&open.id, step, limits);
+    let (job, is_new) = state.maps().find_or_begin(&open.id, step, limits);
     if is_new {
-        let (state, making) = (state.clone(), Arc::clone(&making));
+        let (state, job) = (state.clone(), Arc::clone(&job));
         tokio::spawn(async move {
-            let (own, mine) = (state.clone(), Arc::clone(&making));
+            let (own, mine) = (state.clone(), Arc::clone(&job));
             let done = state.maps().turn.run(move || Ok(make(&own, &open, &mine)?)).await;
-            making.end(done.err().map(|problem| problem.problem().detail.clone()));
-            state.tell(making.event());
+            job.end(done.err().map(|problem| problem.problem().detail.clone()));
+            state.send_event(job.event());
         });
     }
-    blocking(move || Ok(Json(lock(&making.progress).clone()))).await
+    blocking(move || Ok(Json(lock(&job.progress).clone()))).await
 }
 
-/// The verdict at one pixel: what the images say, and the designation itself
+/// The verdict at one pixel: the image measures, and the result of the designation
 #[utoipa::path(get, operation_id = "show_trackability_at_pixel", path = ShowTrackabilityAtPixel::PATH,
     tag = "trackability", params(MapPixel),
     responses((status = 200, body = PixelVerdict), ApiError))]
@@ -86,11 +86,11 @@ async fn at_pixel(
     let open = stop(&state, &id, step)?;
     let limits = limits(params.limits.as_deref())?;
     let [width, height] = open.traverse.left_camera(step).size;
-    let place = Pixel::new(params.x, params.y);
-    if !(place.x.is_finite() && place.y.is_finite() && place.is_inside(width, height)) {
+    let pixel_at = Pixel::new(params.x, params.y);
+    if !(pixel_at.x.is_finite() && pixel_at.y.is_finite() && pixel_at.is_inside(width, height)) {
         let detail = format!(
             "x, y: ({}, {}) lies outside the left image of {width} x {height} pixels",
-            place.x, place.y
+            pixel_at.x, pixel_at.y
         );
         return Err(ApiError::invalid("query", detail));
     }
@@ -98,14 +98,14 @@ async fn at_pixel(
     state
         .designations()
         .run_until_dropped(move |cancel| {
-            let wanted = (&Settings::default(), &limits);
-            let ground = work_state.maps().ground(&open, step, wanted, cancel)?;
-            Ok(Json(PixelVerdict::of(&open.traverse, &ground, place)))
+            let settings = (&Settings::default(), &limits);
+            let ground = work_state.maps().ground(&open, step, settings, cancel)?;
+            Ok(Json(PixelVerdict::of(&open.traverse, &ground, pixel_at)))
         })
         .await
 }
 
-/// Stops making a map; asking for it again begins it anew
+/// Cancels a map; the next request starts it again
 #[utoipa::path(post, operation_id = "cancel_trackability", path = CancelTrackability::PATH,
     tag = "trackability", params(MapLimits),
     responses((status = 200, body = MapProgress), (status = 204, description = "Nothing was being made"), ApiError))]
@@ -116,16 +116,16 @@ async fn cancel(
 ) -> ApiResult<Response> {
     let limits = limits(params.limits.as_deref())?;
     let open = stop(&state, &id, step)?;
-    let Some(making) = state.maps().take_unfinished(&open.id, step, &limits) else {
-        // A map that was complete a moment ago is what was wanted, too.
+    let Some(job) = state.maps().take_unfinished(&open.id, step, &limits) else {
+        // The map may just have been completed.
         return Ok(StatusCode::NO_CONTENT.into_response());
     };
-    making.cancel.store(true, Ordering::Relaxed);
-    making.end(Some("cancelled".to_owned()));
-    Ok(Json(lock(&making.progress).clone()).into_response())
+    job.cancel.store(true, Ordering::Relaxed);
+    job.end(Some("cancelled".to_owned()));
+    Ok(Json(lock(&job.progress).clone()).into_response())
 }
 
-/// The stop of a traverse that the path names.
+/// The stop of a traverse named in the path.
 fn stop(state: &AppState, id: &str, step: usize) -> ApiResult<Arc<OpenTraverse>> {
     let open = state.traverse(id)?;
     if step >= open.traverse.stop_count() {
@@ -134,37 +134,36 @@ fn stop(state: &AppState, id: &str, step: usize) -> ApiResult<Arc<OpenTraverse>>
     Ok(open)
 }
 
-/// Makes a map row by row.
-fn make(state: &AppState, open: &OpenTraverse, making: &Making) -> Result<()> {
-    let ground =
-        state.maps().ground(open, making.step, (&Settings::default(), &making.limits), &making.cancel)?;
+/// Computes a map row by row.
+fn make(state: &AppState, open: &OpenTraverse, job: &MapJob) -> Result<()> {
+    let ground = state.maps().ground(open, job.step, (&Settings::default(), &job.limits), &job.cancel)?;
     let empty = TrackabilityMap::empty(&ground);
     let rows = empty.rows;
     {
-        let mut progress = lock(&making.progress);
+        let mut progress = lock(&job.progress);
         (progress.n, progress.map) = (rows, Some(empty.clone()));
     }
-    let mut told = Instant::now();
+    let mut last_report = Instant::now();
     for row in 0..rows {
-        if making.cancel.load(Ordering::Relaxed) {
+        if job.cancel.load(Ordering::Relaxed) {
             return Err(Error::Cancelled);
         }
         let cells = empty.judge_row(&ground, row);
-        let mut progress = lock(&making.progress);
+        let mut progress = lock(&job.progress);
         progress.k = row + 1;
         if let Some(map) = &mut progress.map {
             map.add(&cells);
         }
         drop(progress);
-        if told.elapsed() >= TOLD_EVERY {
-            told = Instant::now();
-            state.tell(making.event());
+        if last_report.elapsed() >= REPORT_INTERVAL {
+            last_report = Instant::now();
+            state.send_event(job.event());
         }
     }
     Ok(())
 }
 
-/// The problem of a refused designation, with the nearest good pixel where there is one.
+/// The problem of a rejected designation, with the nearest good pixel if there is one.
 pub(crate) fn refusal(
     state: &AppState,
     open: &OpenTraverse,
@@ -172,13 +171,13 @@ pub(crate) fn refusal(
     settings: &Settings,
     error: Error,
 ) -> ApiError {
-    let Designation { step, pixel: place, camera } = designation;
-    // The map of a stop is that of its main pair.
+    let Designation { step, pixel: pixel_at, camera } = designation;
+    // Maps exist for the main pair only.
     let is_refused =
         matches!(error, Error::Target(_)) && camera.is_none() && step < open.traverse.stop_count();
     let problem = ApiError::from(error);
     let [width, height] = if is_refused { open.traverse.left_camera(step).size } else { [0, 0] };
-    if !place.is_inside(width, height) {
+    if !pixel_at.is_inside(width, height) {
         return problem;
     }
     let limits = TrackabilityLimits::default();
@@ -186,7 +185,7 @@ pub(crate) fn refusal(
         .maps()
         .ground(open, step, (settings, &limits), &CancelFlag::default())
         .ok()
-        .and_then(|ground| pixel::nearest_good(&open.traverse, &ground, place));
+        .and_then(|ground| pixel::nearest_good(&open.traverse, &ground, pixel_at));
     match found {
         Some(good) => problem
             .hint(format!("The nearest good pixel is ({:.0}, {:.0}).", good.x, good.y))

@@ -1,4 +1,4 @@
-//! `traverses`: what was recorded or is simulated, and its images.
+//! `traverses`: recorded and simulated traverses, and their images.
 
 use std::sync::atomic::AtomicBool;
 
@@ -22,10 +22,10 @@ use utoipa::ToSchema;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
-use crate::brought;
 use crate::cancel::{CancelFlag, CancelOnDrop};
 use crate::drives;
 use crate::extract::{Body, Params, Path};
+use crate::import_session;
 use crate::jobs::blocking;
 use crate::problem::{ApiError, ApiResult};
 use crate::rendering::OpenTraverse;
@@ -44,7 +44,7 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
         .routes(route::<Prefetch>(routes!(prefetch)))
 }
 
-/// What to do about an image that cannot be read.
+/// The hint for an image that cannot be read.
 const MEND: &str =
     "Put the file back or mend it, then try again; the other steps can be looked at as they are.";
 
@@ -72,16 +72,16 @@ fn entry(state: &AppState, open: &OpenTraverse) -> TraverseEntry {
     }
 }
 
-/// Opens a simulated drive by its scenario
+/// Opens a simulated drive from a scenario
 ///
-/// The same scenario is the same drive. It stays open across restarts; its images are rendered when they are looked at.
+/// The same scenario is the same drive. It stays open across restarts; its images are rendered on demand.
 #[utoipa::path(post, operation_id = "open_traverse", path = AddTraverse::PATH, tag = "traverses", request_body = NewTraverse, responses(
     (status = 200, description = "It was open already", body = TraverseEntry),
     (status = 201, body = TraverseEntry), ApiError))]
 async fn add(State(state): State<AppState>, Body(new): Body<AddTraverse>) -> ApiResult<Response> {
     let work_state = state.clone();
     let work = move |cancel: &CancelFlag| {
-        let (open, is_new) = brought::open(&work_state, &new.scenario, cancel)?;
+        let (open, is_new) = import_session::open_scenario(&work_state, &new.scenario, cancel)?;
         let status = if is_new { StatusCode::CREATED } else { StatusCode::OK };
         let location = location::<ShowTraverse>(&AtTraverse { id: open.id.clone() });
         Ok((status, location, Json(entry(&work_state, &open))).into_response())
@@ -129,8 +129,8 @@ fn no_step(step: usize) -> ApiError {
 
 /// An image of a stop as PNG
 ///
-/// An image of a simulated stop is rendered when it is first asked for, which takes some seconds. 202 without an image: the drive
-/// has not taken it yet; ask again.
+/// An image of a simulated stop is rendered on the first request, which takes some seconds. 202 without an image: the drive
+/// has not captured it yet; ask again.
 #[utoipa::path(get, operation_id = "show_image", path = ShowImage::PATH, tag = "traverses", params(("file" = String, Path, description = "left.png or right.png"),
     ImageWish), responses(
     (status = 200, content_type = "image/png", body = FileBytes),
@@ -172,7 +172,7 @@ async fn image(
         .pictures()
         .run(move || {
             encode(&open, (step, params.camera, is_left), is_deep, &flag).map_err(|error| {
-                // A drive that goes on takes them: the page asks again.
+                // The drive will capture them when it continues; the page repeats the request.
                 if open.traverse.is_awaited(step) {
                     return ApiError::awaited(error.to_string());
                 }
@@ -182,11 +182,11 @@ async fn image(
             })
         })
         .await?;
-    // The browser keeps it, and asks before it uses it again: files may be exchanged between two starts of the server.
+    // The browser caches the image, but revalidates it: files may be replaced between two starts of the server.
     Ok(revision::unless_known(&headers, "image/png", png))
 }
 
-/// Renders the stops from this one on before all others
+/// Renders the stops from this one onwards before all others
 #[utoipa::path(post, operation_id = "prefetch", path = Prefetch::PATH, tag = "traverses", params(FirstStop), responses((status = 204), ApiError))]
 async fn prefetch(
     State(state): State<AppState>,
@@ -194,7 +194,7 @@ async fn prefetch(
     Params(params): Params<Prefetch>,
 ) -> ApiResult<StatusCode> {
     let open = state.traverse(&id)?;
-    state.look_at(&open, params.from);
+    state.prefetch_from(&open, params.from);
     Ok(StatusCode::NO_CONTENT)
 }
 
@@ -236,7 +236,7 @@ fn view(open: &OpenTraverse) -> TraverseView {
     }
 }
 
-/// The image as the bytes of a PNG file; whatever the file on disk is, a full scale of 1 becomes the brightest.
+/// Encodes the image as PNG, independent of the file format on disk; a value of 1 becomes full scale.
 fn encode(
     open: &OpenTraverse,
     (step, camera, is_left): (usize, Option<CameraName>, bool),

@@ -1,4 +1,4 @@
-//! `…/steps/{step}/what_if`: one step computed again with changed settings or a displaced prediction, not stored.
+//! `…/steps/{step}/what_if`: recomputes one step with changed settings or a displaced prediction, without storing it.
 
 use axum::Json;
 use axum::extract::State;
@@ -15,9 +15,9 @@ use crate::recorded_step::RecordedStep;
 use crate::routes::route::route;
 use crate::state::AppState;
 
-/// How far outside every image a prediction may be put, px.
+/// Maximum absolute coordinate of a displaced prediction, px.
 const PIXEL_LIMIT: f64 = 1e5;
-/// How many arrays may be asked for at a time.
+/// Maximum number of arrays per request.
 const ARRAY_LIMIT: usize = 8;
 
 /// The routes of this resource.
@@ -27,13 +27,13 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
 
 /// Tries a step with changed settings or a displaced prediction
 ///
-/// From what the run's previous step left; nothing is stored. To go on like that, run the target again from this step
-/// with the same settings and prediction.
+/// Starts from the state after the run's previous step; nothing is stored. To continue with the changes, fork the run at
+/// this step with the same settings and prediction.
 #[utoipa::path(post, operation_id = "what_if", path = TryStep::PATH,
     tag = "why", request_body = WhatIf, responses((status = 200, body = Ghost), ApiError))]
 async fn what_if(
     State(state): State<AppState>,
-    mut asked: RecordedStep,
+    mut step: RecordedStep,
     Body(what_if): Body<TryStep>,
 ) -> ApiResult<Json<Ghost>> {
     check_pixel(what_if.prediction_px)?;
@@ -41,20 +41,20 @@ async fn what_if(
         let detail = format!("arrays: at most {ARRAY_LIMIT} can be asked for at a time");
         return Err(ApiError::invalid("field", detail));
     }
-    let settings = asked.settings.with(&what_if.settings)?;
+    let settings = step.settings.with(&what_if.settings)?;
     state
         .tries()
         .run_until_dropped(move |cancel| {
-            asked.prepare(cancel)?;
-            let open = asked.live.traverse();
+            step.prepare(cancel)?;
+            let open = step.live.traverse();
             let drive = &open.traverse;
-            let tried = try_step(drive, asked.base(), &what_if, cancel.as_ref().into())?;
-            Ok(Json(Ghost::new(what_if, &tried, &asked.recorded, &settings)))
+            let tried = try_step(drive, step.base(), &what_if, cancel.as_ref().into())?;
+            Ok(Json(Ghost::new(what_if, &tried, &step.recorded, &settings)))
         })
         .await
 }
 
-/// Refuses a pixel that no prediction can have.
+/// Rejects a pixel outside the valid range of a prediction.
 ///
 /// # Errors
 /// A problem that names the field.

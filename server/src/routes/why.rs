@@ -1,4 +1,4 @@
-//! `…/steps/{step}/why`: where a value of a step came from, and its verdict as one sentence.
+//! `…/steps/{step}/why`: the derivation of a value of a step, and its verdict as one sentence.
 
 use axum::Json;
 use sightline_api::endpoint::Endpoint;
@@ -20,9 +20,9 @@ pub(crate) fn router() -> OpenApiRouter<AppState> {
     OpenApiRouter::new().routes(route::<ShowWhy>(routes!(why)))
 }
 
-/// Where a value of a step came from
+/// The derivation of a value of a step
 ///
-/// A tree of formula, inputs, stage and file or pose; with the verdict of the step as one sentence.
+/// A tree of formula, inputs, stage and file or pose, with the verdict of the step as one sentence.
 #[utoipa::path(get, operation_id = "why", path = ShowWhy::PATH,
     tag = "why", params(ValueName),
     responses((status = 200, body = Explanation), ApiError))]

@@ -1,4 +1,4 @@
-//! The limits of the state, and what its parts take.
+//! The limits of the state, and its memory usage.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ impl AppState {
         &self.0.limits
     }
 
-    /// Images and other results of all drives.
+    /// Cache of images and other results of all drives.
     pub(crate) fn cache(&self) -> &Arc<Cache> {
         &self.0.cache
     }
@@ -27,12 +27,12 @@ impl AppState {
         &self.0.connections
     }
 
-    /// The answers to requests that may be sent again.
+    /// The stored answers to repeatable requests.
     pub(crate) fn repeated(&self) -> &Arc<Answers> {
         &self.0.repeated
     }
 
-    /// What the parts of the server take.
+    /// Resource usage of the server's parts.
     pub(crate) fn usage(&self) -> Usage {
         let (threads, resident_bytes) = memory::of_process();
         Usage {

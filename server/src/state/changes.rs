@@ -1,4 +1,4 @@
-//! Beginning and changing sessions: a change is on disk before anybody hears of it, or it is taken back.
+//! Creates and changes sessions: a change is on disk before pages are notified, or it is undone.
 
 use std::sync::Arc;
 
@@ -15,21 +15,21 @@ use crate::rendering::OpenTraverse;
 use crate::store;
 
 impl AppState {
-    /// Begins a session on a traverse.
+    /// Creates a session on a traverse.
     ///
     /// # Errors
-    /// A problem when there are too many already.
+    /// A problem if there are too many.
     pub fn begin_session(&self, traverse: Arc<OpenTraverse>) -> ApiResult<Arc<LiveSession>> {
         let count = traverse.traverse.stop_count();
         let name = traverse.id.clone();
         self.enter_session(traverse, true, |id| Ok((Session::new(id, &name, count), Notes::default())))
     }
 
-    /// Enters the session that `make` makes of its name, once it is on disk, and tells every page; one that is not awake has
-    /// its runs computed when it is asked for.
+    /// Adds the session that `make` creates for its name, once it is on disk, and notifies every page. The runs of a session
+    /// that is not awake are computed on its first request.
     ///
     /// # Errors
-    /// A problem when there are too many already, that of `make`, or when it cannot be written: nothing is begun then.
+    /// A problem if there are too many, that of `make`, or if it cannot be written: no session is created then.
     pub(crate) fn enter_session(
         &self,
         traverse: Arc<OpenTraverse>,
@@ -54,13 +54,13 @@ impl AppState {
             self.0.store.remove(&live.id)?;
             return Err(ApiError::not_found("The drive was removed meanwhile."));
         }
-        self.keep_up(&live);
+        self.add_new_stops(&live);
         self.announce(&live);
         Ok(live)
     }
 
-    /// Gives a session the stops that its drive has come to meanwhile.
-    pub(super) fn keep_up(&self, live: &LiveSession) {
+    /// Updates a session with new stops of its drive.
+    pub(super) fn add_new_stops(&self, live: &LiveSession) {
         let now = live.traverse();
         if let Ok(current) = self.traverse(&now.id)
             && current.traverse.stop_count() > now.traverse.stop_count()
@@ -69,10 +69,10 @@ impl AppState {
         }
     }
 
-    /// Changes a session, saves it, and tells every page: all or nothing.
+    /// Changes a session, saves it, and notifies every page: all or nothing.
     ///
     /// # Errors
-    /// That of `work`, or when the session was removed or cannot be written.
+    /// That of `work`, or if the session was removed or cannot be written.
     pub(crate) fn change<T>(
         &self,
         live: &LiveSession,
@@ -81,7 +81,7 @@ impl AppState {
         self.change_and(live, work, |_| ())
     }
 
-    /// As [`Self::change`], with something to be done before the session is used again, once it is on disk.
+    /// As [`Self::change`]; calls `then` after saving, before the session is unlocked.
     ///
     /// # Errors
     /// As [`Self::change`].
@@ -96,26 +96,26 @@ impl AppState {
         Ok(value)
     }
 
-    /// Tells every page that a session was changed.
+    /// Notifies every page that a session was changed.
     fn announce(&self, live: &LiveSession) {
         live.measure();
-        self.tell(Event::SessionChanged { session: live.id.clone() });
-        self.touched(live);
+        self.send_event(Event::SessionChanged { session: live.id.clone() });
+        self.mark_used(live);
     }
 
-    /// Remembers that a session is used now.
-    fn touched(&self, live: &LiveSession) {
+    /// Records that a session is in use.
+    fn mark_used(&self, live: &LiveSession) {
         live.set_used(Some(jiff::Timestamp::now()));
         self.0.store.touch(&live.id, clock::now());
     }
 
-    /// Remembers a cursor that moved, which is on disk a moment later, and tells every page.
-    pub(crate) fn cursor_moved(&self, live: &LiveSession, cursor: Cursor) {
+    /// Stores a moved cursor, which is written to disk with a short delay, and notifies every page.
+    pub(crate) fn move_cursor(&self, live: &LiveSession, cursor: Cursor) {
         if live.is_removed() {
             return;
         }
         self.0.store.move_cursor(&live.id, cursor);
-        self.touched(live);
-        self.tell(Event::CursorMoved { session: live.id.clone(), cursor });
+        self.mark_used(live);
+        self.send_event(Event::CursorMoved { session: live.id.clone(), cursor });
     }
 }

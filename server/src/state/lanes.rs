@@ -1,10 +1,10 @@
-//! The lanes in which requests are answered: how much is done at a time, and how much may wait.
+//! The lanes of requests: how many are processed concurrently, and how many may wait.
 
 use super::AppState;
 use crate::jobs::Lane;
 use crate::limits::{Limit, SharedLimits};
 
-/// Questions that are answered at a time: each tries many steps, and each step uses all processors.
+/// Number of concurrent counterfactual questions: each tries many steps, and each step uses all processors.
 const ANSWERS_AT_A_TIME: usize = 1;
 
 /// The lanes of requests; runs, studies and trackability maps have their own.
@@ -17,7 +17,7 @@ pub(super) struct Lanes {
     answers: Lane,
 }
 
-/// A lane by its limits.
+/// A lane with these limits.
 pub(super) fn lane(at_a_time: &Limit, waiting: &Limit) -> Lane {
     Lane::new(at_a_time.count(), waiting.count())
 }
@@ -25,7 +25,7 @@ pub(super) fn lane(at_a_time: &Limit, waiting: &Limit) -> Lane {
 impl Lanes {
     pub(super) fn new(limits: &SharedLimits) -> Self {
         let interactive =
-            || lane(&limits.designations_at_a_time, &limits.designations_waiting).within(limits);
+            || lane(&limits.designations_at_a_time, &limits.designations_waiting).with_time_limit(limits);
         Self {
             designations: interactive(),
             pictures: lane(&limits.images_at_a_time, &limits.images_waiting),
@@ -38,32 +38,32 @@ impl Lanes {
 }
 
 impl AppState {
-    /// Where designations are computed.
+    /// The lane for designations.
     pub(crate) fn designations(&self) -> &Lane {
         &self.0.lanes.designations
     }
 
-    /// Where images are read.
+    /// The lane for reading images.
     pub(crate) fn pictures(&self) -> &Lane {
         &self.0.lanes.pictures
     }
 
-    /// Where expressions are asked over all steps.
+    /// The lane for queries over all steps.
     pub(crate) fn queries(&self) -> &Lane {
         &self.0.lanes.queries
     }
 
-    /// Where recordings are written.
+    /// The lane for exports.
     pub(crate) fn exports(&self) -> &Lane {
         &self.0.lanes.exports
     }
 
-    /// Where single steps are tried.
+    /// The lane for trials of single steps.
     pub(crate) fn tries(&self) -> &Lane {
         &self.0.lanes.tries
     }
 
-    /// Where questions are answered.
+    /// The lane for counterfactual questions.
     pub(crate) fn answers(&self) -> &Lane {
         &self.0.lanes.answers
     }

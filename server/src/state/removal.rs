@@ -1,4 +1,4 @@
-//! Removing sessions and drives from the state, and taking the removal of a session back.
+//! Removes sessions and drives from the state, and restores sessions.
 
 use std::sync::{Arc, MutexGuard};
 
@@ -12,10 +12,10 @@ use crate::rendering::OpenTraverse;
 use crate::{sessions, store};
 
 impl AppState {
-    /// Removes a session; the removal can be taken back with [`Self::restore_session`].
+    /// Removes a session; [`Self::restore_session`] restores it.
     ///
     /// # Errors
-    /// A problem when there is none, or the database cannot be written.
+    /// A problem if it does not exist, or the database cannot be written.
     pub(crate) fn remove_session(&self, id: &str) -> ApiResult<()> {
         let missing = || ApiError::not_found("There is no such session.");
         let number = store::number_of(id).ok_or_else(missing)?;
@@ -26,38 +26,38 @@ impl AppState {
         lock(&self.0.sessions).take(number);
         self.0.questions.forget_session(id);
         self.0.streams.close(id);
-        self.tell(Event::SessionRemoved { session: id.to_owned() });
+        self.send_event(Event::SessionRemoved { session: id.to_owned() });
         Ok(())
     }
 
-    /// Takes the removal of a session back; its runs are computed again.
+    /// Restores a removed session; its runs are recomputed.
     ///
     /// # Errors
-    /// A problem when it was not removed, or too long ago.
+    /// A problem if it was not removed, or too long ago.
     pub(crate) fn restore_session(&self, id: &str) -> ApiResult<Arc<LiveSession>> {
         let number = store::number_of(id);
         let number = number.ok_or_else(|| ApiError::not_found("There is no such removed session."))?;
         sessions::restore(&self.0.sessions, &self.0.store, &self.limits().sessions, number)?;
         let restored = lock(&self.0.sessions).by_number.get(&number).cloned();
-        restored.iter().for_each(|live| self.keep_up(live));
-        self.tell(Event::SessionChanged { session: id.to_owned() });
+        restored.iter().for_each(|live| self.add_new_stops(live));
+        self.send_event(Event::SessionChanged { session: id.to_owned() });
         self.session(id)
     }
 
-    /// Whether a traverse was opened from a page, so that it can be removed.
+    /// Whether a traverse was opened from a page and can be removed.
     pub(crate) fn is_removable(&self, open: &OpenTraverse) -> bool {
         !self.0.given.contains(&open.id)
     }
 
-    /// Held while a drive is made or removed.
-    pub(crate) fn making_drives(&self) -> MutexGuard<'_, ()> {
-        lock(&self.0.making_drives)
+    /// Locks the creation and removal of drives.
+    pub(crate) fn drive_folder_lock(&self) -> MutexGuard<'_, ()> {
+        lock(&self.0.drive_folder_lock)
     }
 
-    /// Takes a traverse without sessions out of the list; new ones cannot be begun on it from then on.
+    /// Closes a traverse without sessions; new sessions on it are then impossible.
     ///
     /// # Errors
-    /// A problem when it has sessions.
+    /// A problem if it has sessions.
     pub(crate) fn close_traverse(&self, open: &OpenTraverse) -> ApiResult<()> {
         let mut traverses = lock(&self.0.traverses);
         let mut sessions = lock(&self.0.sessions);

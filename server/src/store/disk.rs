@@ -1,8 +1,8 @@
-//! The open database: reading, and writing so that a failure leaves nothing behind.
+//! The open database: reads, and writes without partial effects.
 //!
-//! After a failed read or write the library refuses all work until the file is opened again, so that is what happens. A
-//! transaction that failed while it was committed may be on disk or not; the number of the last transaction in the file
-//! tells, and one that is there although it was refused is undone before anything else is written.
+//! After a failed read or write, redb refuses all work until the file is reopened, which happens here. A transaction that
+//! failed during its commit may be on disk or not. The number of the last transaction in the file decides; if a failed
+//! transaction is on disk, it is undone before anything else is written.
 
 use std::cell::{Cell, RefCell};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -14,46 +14,46 @@ use serde::Serialize;
 use sightline_geometry::error::{Error, Result};
 
 use super::META;
-use super::record::{Place, decode, encode};
+use super::record::{RecordKey, decode, encode};
 use crate::jobs::lock;
 use crate::printable::printable;
 
 /// The entry of [`META`] with the number of the last transaction.
 pub(super) const SEQUENCE: &str = "sequence";
-/// What the numbers of transactions skip at each start, so that one that was cut off shares its number with no other one.
+/// Gap in the transaction numbers at each start, so that the number of an interrupted transaction is never reused.
 const SEQUENCE_GAP: u64 = 1 << 20;
-/// Bytes that are written to find out whether writing works again: as many as a long note.
+/// Size of a test write after a failure, bytes: as large as a long note.
 const PROBE_BYTES: usize = 64 << 10;
 
-/// What opens the database: the file of a server, or in tests a storage that fails.
+/// Opens the database: the file of a server, or in tests a storage that fails.
 pub(super) type Opener = Box<dyn Fn() -> std::result::Result<Database, DatabaseError> + Send + Sync>;
 
-/// A result of the library.
+/// A result of redb.
 pub(super) type Outcome<T> = std::result::Result<T, redb::Error>;
 
 /// The open database.
 pub(super) struct Disk {
     pub(super) path: PathBuf,
     opener: Opener,
-    /// None after a failure, until it is opened again.
+    /// `None` after a failure, until it is reopened.
     database: RwLock<Option<Database>>,
     writing: Mutex<Writing>,
     trouble: Mutex<Option<String>>,
 }
 
-/// What only one writer at a time may use.
+/// State of the single writer.
 struct Writing {
     /// The number of the next transaction.
     next: u64,
-    /// The transaction that failed last, if it may be on disk, with what undoes it.
+    /// The last failed transaction, if it may be on disk, with the values that undo it.
     in_doubt: Option<(u64, Vec<Earlier>)>,
 }
 
-/// What was at a place before a transaction.
-type Earlier = (Place, Option<Vec<u8>>);
+/// The value at a place before a transaction.
+type Earlier = (RecordKey, Option<Vec<u8>>);
 
 impl Disk {
-    /// A database that is open, and what opens it again.
+    /// An open database, with the function that reopens it.
     pub(super) fn new(path: PathBuf, database: Database, opener: Opener) -> Outcome<Self> {
         let next = last_sequence(&database)? + SEQUENCE_GAP;
         Ok(Self {
@@ -65,19 +65,19 @@ impl Disk {
         })
     }
 
-    /// Why changes cannot be saved now; none after one was saved.
+    /// Why changes cannot be saved; `None` after a successful write.
     pub(super) fn trouble(&self) -> Option<String> {
         lock(&self.trouble).clone()
     }
 
-    /// Reads.
+    /// Reads from the database, which is reopened after a failure.
     ///
     /// # Errors
     /// [`Error::Read`].
     pub(super) fn read<T>(&self, work: impl FnOnce(&Database) -> Outcome<T>) -> Result<T> {
         if self.shared().is_none() {
             let ready = self.ready(&mut lock(&self.writing));
-            // A refused change that cannot be undone now is no reason to read nothing.
+            // Reading is possible even if a failed change cannot be undone.
             if self.shared().is_none() {
                 ready.map_err(|error| self.failed(error))?;
             }
@@ -95,10 +95,10 @@ impl Disk {
         })
     }
 
-    /// Carries out one transaction, which is dropped unless `work` changed something.
+    /// Performs one transaction, which is aborted if `work` changes nothing.
     ///
     /// # Errors
-    /// [`Error::Write`]; nothing of it is kept.
+    /// [`Error::Write`]; the transaction then has no effect.
     pub(super) fn write(&self, work: impl FnOnce(&Write) -> Outcome<()>) -> Result<()> {
         let outcome = self.attempt(&mut lock(&self.writing), work);
         let mut trouble = lock(&self.trouble);
@@ -125,17 +125,17 @@ impl Disk {
         }
     }
 
-    /// Finds out, while saving fails, whether it works again, by writing what nobody needs.
+    /// Tests whether saving works again after a failure, by writing test data.
     pub(super) fn probe_in_trouble(&self) -> Result<()> {
         if self.trouble().is_none() {
             return Ok(());
         }
-        let place = Place::Removed("probe".to_owned());
-        self.write(|write| write.put(place.clone(), &"x".repeat(PROBE_BYTES)).map(|_| ()))?;
-        self.write(|write| write.remove(&place).map(|_| ()))
+        let record_key = RecordKey::Removed("probe".to_owned());
+        self.write(|write| write.put(record_key.clone(), &"x".repeat(PROBE_BYTES)).map(|_| ()))?;
+        self.write(|write| write.remove(&record_key).map(|_| ()))
     }
 
-    /// One transaction; whether it changed something.
+    /// Performs one transaction; returns whether it changed anything.
     fn attempt(&self, writing: &mut Writing, work: impl FnOnce(&Write) -> Outcome<()>) -> Outcome<bool> {
         self.ready(writing)?;
         let sequence = writing.next;
@@ -148,16 +148,16 @@ impl Disk {
         if outcome.is_err() {
             writing.in_doubt = Some((sequence, earlier));
             self.close();
-            // Where this fails, too, the next one tries again; the first error is the one to report.
+            // If this fails, too, the next operation tries again; the first error is reported.
             let _ = self.ready(writing);
         }
         outcome
     }
 
-    /// Opens the database where it is closed, and undoes what was refused but is on disk.
+    /// Reopens the database if it is closed, and undoes a failed transaction that is on disk.
     fn ready(&self, writing: &mut Writing) -> Outcome<()> {
         if self.shared().is_none() {
-            // The library panics at some damage.
+            // redb panics at some kinds of damage.
             let opened = catch_unwind(AssertUnwindSafe(&self.opener));
             let opened =
                 opened.map_err(|_| redb::Error::Corrupted("it cannot be opened again".to_owned()))?;
@@ -205,7 +205,7 @@ fn carry_out(
     work: impl FnOnce(&Write) -> Outcome<()>,
 ) -> Outcome<bool> {
     let mut transaction = database.begin_write()?;
-    // A page of the last transaction that is damaged later is then told from one that was never written.
+    // Later, a damaged page of the last transaction can then be distinguished from one that was never written.
     transaction.set_two_phase_commit(true);
     let write = Write { transaction, sequence, earlier: RefCell::default(), is_changed: Cell::new(false) };
     let worked = work(&write);
@@ -221,13 +221,13 @@ fn carry_out(
     Ok(true)
 }
 
-/// Writes what was there before a transaction. The records get new numbers, so that they count as the newest.
+/// Restores the values before a transaction. The records get new numbers, so that they count as the newest.
 fn undo(database: &Database, sequence: u64, earlier: &[Earlier]) -> Outcome<()> {
     let mut transaction = database.begin_write()?;
     transaction.set_two_phase_commit(true);
-    for (place, bytes) in earlier.iter().rev() {
-        let json = bytes.as_ref().map(|bytes| decode(place, bytes).unwrap_or(bytes));
-        place.set(&transaction, json.map(|json| encode(place, sequence, json)).as_deref())?;
+    for (record_key, bytes) in earlier.iter().rev() {
+        let json = bytes.as_ref().map(|bytes| decode(record_key, bytes).unwrap_or(bytes));
+        record_key.set(&transaction, json.map(|json| encode(record_key, sequence, json)).as_deref())?;
     }
     transaction.open_table(META)?.insert(SEQUENCE, sequence)?;
     Ok(transaction.commit()?)
@@ -239,7 +239,7 @@ fn last_sequence(database: &Database) -> Outcome<u64> {
     Ok(meta.get(SEQUENCE)?.map_or(0, |value| value.value()))
 }
 
-/// Whether an error means that the database has to be opened again.
+/// Whether an error requires the database to be reopened.
 fn is_of_the_storage(error: &redb::Error) -> bool {
     matches!(error, redb::Error::Io(_) | redb::Error::PreviousIo | redb::Error::DatabaseClosed)
 }
@@ -251,7 +251,7 @@ pub(super) fn io_error(error: redb::Error) -> std::io::Error {
     }
 }
 
-/// A transaction that writes.
+/// A write transaction.
 pub(super) struct Write {
     pub(super) transaction: WriteTransaction,
     sequence: u64,
@@ -260,54 +260,54 @@ pub(super) struct Write {
 }
 
 impl Write {
-    /// A number of [`META`]; it is not undone.
+    /// Sets a number in [`META`]; it is not undone.
     pub(super) fn put_meta(&self, name: &str, value: u64) -> Outcome<()> {
         self.transaction.open_table(META)?.insert(name, value)?;
         self.is_changed.set(true);
         Ok(())
     }
 
-    /// Writes a value where it differs from what is there; whether it did.
-    pub(super) fn put(&self, place: Place, value: &impl Serialize) -> Outcome<bool> {
+    /// Writes a value if it differs from the stored one; returns whether it did.
+    pub(super) fn put(&self, record_key: RecordKey, value: &impl Serialize) -> Outcome<bool> {
         let json = serde_json::to_vec(value).map_err(|error| redb::Error::Corrupted(error.to_string()))?;
-        self.put_json(place, &json)
+        self.put_json(record_key, &json)
     }
 
-    /// As [`Self::put`], for a value that is JSON already.
-    pub(super) fn put_json(&self, place: Place, json: &[u8]) -> Outcome<bool> {
-        let before = place.get(&self.transaction)?;
-        if before.as_ref().is_some_and(|bytes| decode(&place, bytes) == Ok(json)) {
+    /// As [`Self::put`], for a value that is already JSON.
+    pub(super) fn put_json(&self, record_key: RecordKey, json: &[u8]) -> Outcome<bool> {
+        let before = record_key.get(&self.transaction)?;
+        if before.as_ref().is_some_and(|bytes| decode(&record_key, bytes) == Ok(json)) {
             return Ok(false);
         }
-        place.set(&self.transaction, Some(&encode(&place, self.sequence, json)))?;
-        self.note(place, before);
+        record_key.set(&self.transaction, Some(&encode(&record_key, self.sequence, json)))?;
+        self.note(record_key, before);
         Ok(true)
     }
 
-    /// The JSON text at a place, unless it was altered.
-    pub(super) fn get(&self, place: &Place) -> Outcome<Option<Vec<u8>>> {
-        let bytes = place.get(&self.transaction)?;
-        Ok(bytes.and_then(|bytes| decode(place, &bytes).ok().map(<[u8]>::to_vec)))
+    /// The JSON text at a place, if it is not corrupted.
+    pub(super) fn get(&self, record_key: &RecordKey) -> Outcome<Option<Vec<u8>>> {
+        let bytes = record_key.get(&self.transaction)?;
+        Ok(bytes.and_then(|bytes| decode(record_key, &bytes).ok().map(<[u8]>::to_vec)))
     }
 
-    /// Removes what is at a place; whether it was there.
-    pub(super) fn remove(&self, place: &Place) -> Outcome<bool> {
-        let Some(before) = place.get(&self.transaction)? else { return Ok(false) };
-        place.set(&self.transaction, None)?;
-        self.note(place.clone(), Some(before));
+    /// Removes the value at a place; returns whether there was one.
+    pub(super) fn remove(&self, record_key: &RecordKey) -> Outcome<bool> {
+        let Some(before) = record_key.get(&self.transaction)? else { return Ok(false) };
+        record_key.set(&self.transaction, None)?;
+        self.note(record_key.clone(), Some(before));
         Ok(true)
     }
 
-    fn note(&self, place: Place, before: Option<Vec<u8>>) {
-        self.earlier.borrow_mut().push((place, before));
+    fn note(&self, record_key: RecordKey, before: Option<Vec<u8>>) {
+        self.earlier.borrow_mut().push((record_key, before));
         self.is_changed.set(true);
     }
 
-    /// As [`Self::remove`], and records the removal, so that an older copy in a damaged file is not taken for the present.
-    pub(super) fn remove_for_good(&self, place: &Place) -> Outcome<bool> {
-        if !self.remove(place)? {
+    /// As [`Self::remove`], and records the removal, so that an older copy in a damaged file is not restored.
+    pub(super) fn remove_for_good(&self, record_key: &RecordKey) -> Outcome<bool> {
+        if !self.remove(record_key)? {
             return Ok(false);
         }
-        self.put(Place::Removed(place.to_string()), &self.sequence)
+        self.put(RecordKey::Removed(record_key.to_string()), &self.sequence)
     }
 }

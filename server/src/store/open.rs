@@ -1,5 +1,5 @@
-//! Opening the database: a damaged file is moved aside, one of a newer version is left alone, and the JSON files of an
-//! earlier version are read in once and kept.
+//! Opening the database: a damaged file is moved aside, one of a newer version is not touched, and the JSON files of an
+//! earlier version are imported once and kept.
 
 use std::fs::OpenOptions;
 use std::io::ErrorKind;
@@ -17,17 +17,17 @@ use sightline_recordings::files::{PARTIAL, remove_left_overs, sync_folder};
 use sightline_session::view::SavedSession;
 
 use super::disk::{Disk, Outcome, io_error};
-use super::record::{NAMED, NUMBERED, Place, RUNS, RunKey, SESSIONS, encode, has_line, run_keys};
+use super::record::{NAMED, NUMBERED, RUNS, RecordKey, RunKey, SESSIONS, encode, has_line, run_keys};
 use super::salvage::Salvaged;
 use super::{FILE_NAME, META, STORE_VERSION, Store, id_of, number_of, raise_last_session};
 use crate::folders::{make_file_private, make_private};
 
-/// How long a database is waited for that a server in this very process is about to let go of.
+/// Maximum wait for a database that another server in the same process is about to close.
 const PATIENCE: Duration = Duration::from_secs(5);
-/// Memory for pages of the database, bytes.
+/// Page cache of the database, bytes.
 const CACHE_BYTES: usize = 16 << 20;
 
-/// How the database is opened: one program writes, others may read meanwhile, and every page is checked first.
+/// Options of the database: one program writes, others may read concurrently, and every page is checked on opening.
 pub(super) fn builder() -> Builder {
     let mut builder = Builder::new();
     builder.set_cache_size(CACHE_BYTES).set_concurrency_mode(ConcurrencyMode::SingleWriter);
@@ -35,7 +35,7 @@ pub(super) fn builder() -> Builder {
     builder
 }
 
-/// The database in `folder`, and what happened on the way, one sentence each.
+/// Opens the database in `folder`; returns it with one sentence for each noteworthy event.
 pub(super) fn open(folder: &Path) -> Result<(Disk, Vec<String>)> {
     let path = folder.join(FILE_NAME);
     let unwritable = |source| Error::Write { path: path.clone(), source };
@@ -67,7 +67,8 @@ pub(super) fn open(folder: &Path) -> Result<(Disk, Vec<String>)> {
     disk.map(|disk| (disk, messages)).map_err(|error| failed(&path, &error.to_string()))
 }
 
-/// Puts a damaged file aside, and what can be verified of it in its place; says what happened. At no moment is there no file.
+/// Moves a damaged file aside and replaces it by its verifiable records; returns a sentence about the result. The file
+/// exists at any moment.
 fn salvage(path: &Path, why: &str) -> Result<String> {
     let unwritable = |source| Error::Write { path: path.to_owned(), source };
     let folder = path.parent().unwrap_or(Path::new("."));
@@ -81,11 +82,11 @@ fn salvage(path: &Path, why: &str) -> Result<String> {
     Ok(format!("{from} is damaged ({why}); it was moved to {to}; {summary}"))
 }
 
-/// Makes the database with these records, in place of one that is there, complete or not at all.
+/// Creates the database with these records and replaces an existing one, completely or not at all.
 fn create(path: &Path, records: &Salvaged) -> Result<()> {
     let unwritable = |source: std::io::Error| Error::Write { path: path.to_owned(), source };
     let folder = path.parent().unwrap_or(Path::new("."));
-    // A temporary file is for its owner alone.
+    // Temporary files are accessible to the owner only.
     let prefix = format!(".{FILE_NAME}.");
     let file = tempfile::Builder::new().prefix(&prefix).suffix(PARTIAL).tempfile_in(folder);
     let file = file.map_err(unwritable)?;
@@ -106,14 +107,14 @@ fn open_file(path: &Path) -> std::result::Result<Database, DatabaseError> {
     builder().create_with_backend(FileBackend::new(file)?)
 }
 
-/// What is damaged.
+/// Describes the damage.
 struct Damaged(String);
 
-/// Opens the database; the inner error says what is damaged.
+/// Opens the database; the inner error describes the damage.
 fn attempt(path: &Path) -> Result<std::result::Result<Database, Damaged>> {
     let begun = Instant::now();
     loop {
-        // Some damage is met by the library with a panic.
+        // redb panics at some kinds of damage.
         let opened = catch_unwind(AssertUnwindSafe(|| {
             let database = open_file(path)?;
             prepare(&database).map(|version| (database, version))
@@ -143,8 +144,8 @@ fn attempt(path: &Path) -> Result<std::result::Result<Database, Damaged>> {
     }
 }
 
-/// Makes the tables that are missing, and gives the records of an earlier version their lines; returns the version, which
-/// may be a newer one: then nothing is changed.
+/// Creates missing tables and adds verification lines to the records of an earlier version; returns the version. A database
+/// of a newer version is not changed.
 pub(super) fn prepare(database: &Database) -> Outcome<u64> {
     let transaction = database.begin_write()?;
     let version = {
@@ -173,40 +174,44 @@ pub(super) fn prepare(database: &Database) -> Outcome<u64> {
     Ok(version)
 }
 
-/// Gives every record its line, and every session the numbers of its runs.
+/// Adds its verification line to every record, and the numbers of runs to every session.
 fn add_lines(transaction: &WriteTransaction) -> Outcome<()> {
     let mut all = Vec::new();
     for table in NUMBERED {
         for entry in transaction.open_table(table)?.iter()? {
             let (key, value) = entry?;
             all.extend(
-                Place::numbered(table.name(), key.value()).map(|place| (place, value.value().to_vec())),
+                RecordKey::numbered(table.name(), key.value())
+                    .map(|record_key| (record_key, value.value().to_vec())),
             );
         }
     }
     for table in NAMED {
         for entry in transaction.open_table(table)?.iter()? {
             let (key, value) = entry?;
-            all.extend(Place::named(table.name(), key.value()).map(|place| (place, value.value().to_vec())));
+            all.extend(
+                RecordKey::named(table.name(), key.value())
+                    .map(|record_key| (record_key, value.value().to_vec())),
+            );
         }
     }
     for entry in transaction.open_table(RUNS)?.iter()? {
         let (key, value) = entry?;
-        all.push((Place::Run(key.value()), value.value().to_vec()));
+        all.push((RecordKey::Run(key.value()), value.value().to_vec()));
     }
-    for (place, mut bytes) in all {
+    for (record_key, mut bytes) in all {
         if has_line(&bytes) {
             continue;
         }
-        if let Place::Session(number) = place {
+        if let RecordKey::Session(number) = record_key {
             bytes = with_runs(&bytes, &run_keys(transaction, number)?);
         }
-        place.set(transaction, Some(&encode(&place, 1, &bytes)))?;
+        record_key.set(transaction, Some(&encode(&record_key, 1, &bytes)))?;
     }
     Ok(())
 }
 
-/// A session with the numbers of its runs; one that is no session stays as it is.
+/// Adds the numbers of runs to a session; a value that is not a session is unchanged.
 fn with_runs(session: &[u8], runs: &[RunKey]) -> Vec<u8> {
     let Ok(saved) = serde_json::from_slice::<SavedSession>(session) else { return session.to_vec() };
     let count = |target: usize| runs.iter().filter(|(_, of, _)| *of == target as u64).count();
@@ -215,7 +220,7 @@ fn with_runs(session: &[u8], runs: &[RunKey]) -> Vec<u8> {
 }
 
 impl Store {
-    /// Reads in the JSON files of an earlier version, one a session; they are kept under another name.
+    /// Imports the JSON files of an earlier version, one per session, and renames them.
     pub(super) fn read_in_files(&mut self, folder: &Path) -> Result<()> {
         let unreadable = |source| Error::Read { path: folder.to_owned(), source };
         let entries: std::io::Result<Vec<_>> = std::fs::read_dir(folder).map_err(unreadable)?.collect();
@@ -273,7 +278,7 @@ fn move_aside(path: &Path, id: &str, ending: &str, what: &str) -> String {
     }
 }
 
-/// A name in `folder` that nothing has yet: `name.ending`, `name.ending-2` and so on.
+/// A free name in `folder`: `name.ending`, `name.ending-2` and so on.
 pub(super) fn free_name(folder: &Path, name: &str, ending: &str) -> PathBuf {
     let of = |number: u32| match number {
         1 => folder.join(format!("{name}.{ending}")),
@@ -286,7 +291,7 @@ pub(super) fn failed(path: &Path, problem: &str) -> Error {
     Error::Read { path: path.to_owned(), source: std::io::Error::other(problem.to_owned()) }
 }
 
-/// What opening for reading alone said.
+/// Converts an error of opening the database read-only.
 pub(super) fn refused(path: &Path, error: &DatabaseError) -> Error {
     match error {
         DatabaseError::DatabaseAlreadyOpen | DatabaseError::LockProtocolMismatch => {

@@ -1,4 +1,4 @@
-//! A storage in memory that records what is asked of it and can refuse it, as a full or failing disk does.
+//! An in-memory storage that records all operations and can refuse them, like a full or failing disk.
 
 use std::io::{Error as IoError, ErrorKind, Result as IoResult};
 use std::ops::Bound;
@@ -12,20 +12,20 @@ use super::open::{builder, prepare};
 use super::{FILE_NAME, Store};
 use crate::jobs::lock;
 
-/// What a disk writes whole or not at all, bytes.
+/// Unit that a disk writes atomically, bytes.
 const SECTOR: usize = 512;
 
-/// Something that was asked of a storage.
+/// An operation on a storage.
 #[derive(Clone)]
 pub(super) enum Op {
     Write(u64, Vec<u8>),
     Length(u64),
     Sync,
-    /// The program acknowledged a request.
+    /// The program has acknowledged a request.
     Acknowledged,
 }
 
-/// A storage in memory that records everything, and may fail.
+/// An in-memory storage that records every operation and can fail.
 #[derive(Clone, Default)]
 pub(super) struct Storage(pub(super) Arc<Mutex<Content>>);
 
@@ -33,7 +33,7 @@ pub(super) struct Storage(pub(super) Arc<Mutex<Content>>);
 pub(super) struct Content {
     pub(super) bytes: Vec<u8>,
     pub(super) ops: Vec<Op>,
-    /// Operations until one fails, how many fail then, and how.
+    /// Number of successful operations before the failure, number of failing operations, and their error.
     pub(super) failure: Option<(usize, usize, ErrorKind)>,
     pub(super) failed: usize,
 }
@@ -54,7 +54,7 @@ impl Storage {
         Box::new(move || builder().create_with_backend(storage.clone()))
     }
 
-    /// The store on this storage.
+    /// A store on this storage.
     pub(super) fn store(&self, folder: &Path) -> Outcome<Store> {
         let opener = self.opener();
         let database = opener()?;
@@ -84,7 +84,7 @@ impl Storage {
 }
 
 impl Op {
-    /// Carries it out on bytes, for a write the sectors that are to be written.
+    /// Applies the operation to `bytes`; of a write, only the sectors selected by `is_written`.
     pub(super) fn apply(&self, bytes: &mut Vec<u8>, is_written: impl Fn(usize) -> bool) {
         match self {
             Self::Write(at, data) => {

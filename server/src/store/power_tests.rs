@@ -1,8 +1,8 @@
-//! Power losses and failing disks: all writes of real sessions to a storage are recorded; then the power is cut at any of
-//! them, or the storage refuses one.
+//! Power losses and failing disks: all writes of real sessions to a storage are recorded; then the power is cut at any
+//! operation, or the storage refuses one.
 //!
-//! Until a storage is synced, it may have written all, some or nothing of what it was given, in any order, and of a write
-//! any sectors. `SIGHTLINE_POWER_LOSS_POINTS` is the number of cuts.
+//! Before a sync, a storage may have executed all, some or none of its operations, in any order, and any sectors of a write.
+//! `SIGHTLINE_POWER_LOSS_POINTS` is the number of cuts.
 
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
@@ -17,18 +17,18 @@ use super::tests::saved;
 use super::*;
 use crate::jobs::lock;
 
-/// Cuts in the ordinary tests.
+/// Number of cuts in ordinary tests.
 const POINTS: usize = 60;
-/// Requests of the recorded sessions.
+/// Number of requests in the recorded sessions.
 const REQUESTS: u64 = 120;
 /// The number of cuts.
 fn points() -> usize {
     std::env::var("SIGHTLINE_POWER_LOSS_POINTS").map_or(POINTS, |text| text.parse().expect("a number"))
 }
 
-/// Everything that a person put in and the server computed.
+/// The expected contents of the store: user input and computed data.
 #[derive(Clone, Debug, Default, PartialEq)]
-struct Kept {
+struct Contents {
     sessions: BTreeMap<u64, SavedSession>,
     notes: BTreeMap<u64, Notes>,
     documents: BTreeMap<String, Value>,
@@ -37,7 +37,7 @@ struct Kept {
     drives: BTreeMap<String, String>,
 }
 
-impl Kept {
+impl Contents {
     fn in_store(store: &Store) -> Self {
         let found = store.load().unwrap();
         assert!(found.messages.is_empty(), "{:?}", found.messages);
@@ -52,28 +52,28 @@ impl Kept {
         }
     }
 
-    /// Carries out one of the requests, each of another kind than the one before; what is kept is changed only when it is
+    /// Performs one request, of another kind than the previous one; the expected contents change only when it is
     /// acknowledged.
     fn request(&mut self, number: u64, store: &Store) -> Result<()> {
         let mut after = self.clone();
         match number % 10 {
             0 | 1 | 2 | 5 | 9 => after.change_session(number, store)?,
-            _ => after.change_small(number, store)?,
+            _ => after.change_small_records(number, store)?,
         }
         *self = after;
         Ok(())
     }
 
-    /// A session with its notes and its cursor.
+    /// Changes a session, its notes or its cursor.
     fn change_session(&mut self, number: u64, store: &Store) -> Result<()> {
         let session = session_of(number);
         let id = id_of(session);
         match number % 10 {
             0 | 5 => {
-                let kept = self.sessions.entry(session).or_insert_with(|| saved(&id));
-                let another = kept.targets[0].clone();
-                kept.targets.push(another);
-                store.save(kept)
+                let contents = self.sessions.entry(session).or_insert_with(|| saved(&id));
+                let another = contents.targets[0].clone();
+                contents.targets.push(another);
+                store.save(contents)
             }
             1 => {
                 let notes = self.notes.entry(session).or_default();
@@ -83,13 +83,13 @@ impl Kept {
                 store.save_notes(&id, notes)
             }
             2 => {
-                let kept = self.sessions.get_mut(&session).expect("a session");
-                kept.cursor = Cursor { target: Some(0), run: 0, step: number as usize };
-                store.move_cursor(&id, kept.cursor);
+                let contents = self.sessions.get_mut(&session).expect("a session");
+                contents.cursor = Cursor { target: Some(0), run: 0, step: number as usize };
+                store.move_cursor(&id, contents.cursor);
                 store.flush()
             }
             _ => {
-                // The session before the present one, or the present one; its questions and notes go with it.
+                // Removes the previous or the current session, with its questions and notes.
                 let gone = session.saturating_sub(1 - number / 10 % 2);
                 self.sessions.remove(&gone);
                 self.notes.remove(&gone);
@@ -99,8 +99,8 @@ impl Kept {
         }
     }
 
-    /// Documents, studies, questions and drives.
-    fn change_small(&mut self, number: u64, store: &Store) -> Result<()> {
+    /// Changes documents, studies, questions and drives.
+    fn change_small_records(&mut self, number: u64, store: &Store) -> Result<()> {
         match number % 10 {
             3 => {
                 let (name, value) = (format!("layout-{}", number % 3), json!([number, 0.1]));
@@ -146,7 +146,7 @@ fn session_of(number: u64) -> u64 {
     1 + number / 30
 }
 
-/// A new database, as it is put in its place: complete.
+/// A new database, complete when it gets its name.
 fn new_database(folder: &Path) -> Vec<u8> {
     let storage = Storage::default();
     drop(storage.store(folder).unwrap());
@@ -154,19 +154,19 @@ fn new_database(folder: &Path) -> Vec<u8> {
     content.bytes.clone()
 }
 
-/// The recorded sessions: the bytes at their beginning, every operation, and what was kept after each request. The server
-/// is started anew a few times.
-fn recorded(folder: &Path) -> (Vec<u8>, Vec<Op>, Vec<Kept>) {
+/// The recorded sessions: the initial bytes, every operation, and the expected contents after each request. The server is
+/// restarted a few times.
+fn recorded(folder: &Path) -> (Vec<u8>, Vec<Op>, Vec<Contents>) {
     let begin = new_database(folder);
     let storage = Storage::of(begin.clone());
-    let mut states = vec![Kept::default()];
+    let mut states = vec![Contents::default()];
     for part in 0..4 {
         let store = storage.store(folder).unwrap();
         for number in part * REQUESTS / 4..(part + 1) * REQUESTS / 4 {
-            let mut kept = states[states.len() - 1].clone();
-            kept.request(number, &store).unwrap();
-            assert_eq!(Kept::in_store(&store), kept, "request {number}");
-            states.push(kept);
+            let mut contents = states[states.len() - 1].clone();
+            contents.request(number, &store).unwrap();
+            assert_eq!(Contents::in_store(&store), contents, "request {number}");
+            states.push(contents);
             lock(&storage.0).ops.push(Op::Acknowledged);
         }
     }
@@ -174,19 +174,19 @@ fn recorded(folder: &Path) -> (Vec<u8>, Vec<Op>, Vec<Kept>) {
     (begin, ops, states)
 }
 
-/// Numbers that look random, the same in each run.
-struct Chance(u64);
+/// A pseudo-random generator with a fixed sequence.
+struct Rng(u64);
 
-impl Chance {
+impl Rng {
     fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         self.0 >> 33
     }
 }
 
-/// What the storage holds when the power is cut after so many operations. Variant 0 has everything, 1 nothing since the
-/// last sync, 2 some of the operations, and others some of the sectors.
-fn after_a_cut(begin: &[u8], ops: &[Op], variant: usize, chance: &mut Chance) -> Vec<u8> {
+/// The storage after a power cut that follows `ops`. Variant 0 contains all operations, 1 none after the last sync, 2 some
+/// of them, and others some of the sectors.
+fn after_a_cut(begin: &[u8], ops: &[Op], variant: usize, rng: &mut Rng) -> Vec<u8> {
     let mut bytes = begin.to_vec();
     let synced = ops.iter().rposition(|op| matches!(op, Op::Sync)).map_or(0, |last| last + 1);
     ops[..synced].iter().for_each(|op| op.apply(&mut bytes, |_| true));
@@ -194,10 +194,10 @@ fn after_a_cut(begin: &[u8], ops: &[Op], variant: usize, chance: &mut Chance) ->
         match variant {
             0 => op.apply(&mut bytes, |_| true),
             1 => {}
-            2 if chance.next().is_multiple_of(2) => {}
+            2 if rng.next().is_multiple_of(2) => {}
             2 => op.apply(&mut bytes, |_| true),
             _ => {
-                let sectors = chance.next();
+                let sectors = rng.next();
                 op.apply(&mut bytes, |sector| sectors >> (sector % 31) & 1 == 1);
             }
         }
@@ -209,22 +209,26 @@ fn after_a_cut(begin: &[u8], ops: &[Op], variant: usize, chance: &mut Chance) ->
 fn power_losses_at_any_write_lose_nothing_that_was_acknowledged() {
     let folder = tempfile::tempdir().unwrap();
     let (begin, ops, states) = recorded(folder.path());
-    let (points, mut chance) = (points(), Chance(7));
+    let (points, mut rng) = (points(), Rng(7));
     let mut in_flight = 0;
     for point in 0..points {
         let cut = 1 + point * (ops.len() - 1) / points;
         let acknowledged = ops[..cut].iter().filter(|op| matches!(op, Op::Acknowledged)).count();
-        let bytes = after_a_cut(&begin, &ops[..cut], point % 4, &mut chance);
+        let bytes = after_a_cut(&begin, &ops[..cut], point % 4, &mut rng);
         let store = Storage::of(bytes).store(folder.path());
         let store = store.unwrap_or_else(|why| panic!("cut {cut}, variant {}: {why}", point % 4));
-        let kept = Kept::in_store(&store);
-        let is_next = states.get(acknowledged + 1) == Some(&kept);
+        let contents = Contents::in_store(&store);
+        let is_next = states.get(acknowledged + 1) == Some(&contents);
         in_flight += usize::from(is_next);
-        assert!(is_next || kept == states[acknowledged], "cut {cut}, variant {}: {kept:#?}", point % 4);
-        // What was cut off does no harm to what follows.
-        let mut kept = kept;
-        kept.request(REQUESTS, &store).unwrap();
-        assert_eq!(Kept::in_store(&store), kept, "cut {cut}");
+        assert!(
+            is_next || contents == states[acknowledged],
+            "cut {cut}, variant {}: {contents:#?}",
+            point % 4
+        );
+        // The interrupted request does not affect later ones.
+        let mut contents = contents;
+        contents.request(REQUESTS, &store).unwrap();
+        assert_eq!(Contents::in_store(&store), contents, "cut {cut}");
     }
     let writes = ops.iter().filter(|op| !matches!(op, Op::Acknowledged)).count();
     println!(
@@ -235,38 +239,38 @@ fn power_losses_at_any_write_lose_nothing_that_was_acknowledged() {
     );
 }
 
-/// Runs the sessions on a storage that fails, and returns how many requests were refused.
+/// Runs the sessions on a failing storage, and returns the number of refused requests.
 fn with_failure(begin: &[u8], folder: &Path, failure: (usize, usize, ErrorKind)) -> usize {
     let storage = Storage::of(begin.to_vec());
     let store = storage.store(folder).unwrap();
     lock(&storage.0).failure = Some(failure);
-    let (mut kept, mut refused) = (Kept::default(), 0);
+    let (mut contents, mut refused) = (Contents::default(), 0);
     for number in 0..REQUESTS {
-        // The cursor of a session that was refused.
-        if number % 10 == 2 && !kept.sessions.contains_key(&session_of(number)) {
+        // Skips the cursor of a session whose creation was refused.
+        if number % 10 == 2 && !contents.sessions.contains_key(&session_of(number)) {
             continue;
         }
         let failed_before = lock(&storage.0).failed;
-        let outcome = kept.request(number, &store);
+        let outcome = contents.request(number, &store);
         let has_failed = lock(&storage.0).failed > failed_before;
         assert!(outcome.is_ok() || has_failed, "request {number} of {failure:?}: {outcome:?}");
         assert!(outcome.is_ok() || store.trouble().is_some(), "request {number} of {failure:?}");
         refused += usize::from(outcome.is_err());
     }
     lock(&storage.0).failure = None;
-    // A cursor that could not be written is written now, and the next change ends the trouble.
+    // A pending cursor is written, and the next change ends the failure.
     store.flush().unwrap();
-    kept.change_small(REQUESTS + 3, &store).unwrap();
+    contents.change_small_records(REQUESTS + 3, &store).unwrap();
     assert_eq!(store.trouble(), None, "{failure:?}");
-    let in_memory = Kept::in_store(&store);
+    let in_memory = Contents::in_store(&store);
     drop(store);
-    let again = Kept::in_store(&storage.store(folder).unwrap());
+    let again = Contents::in_store(&storage.store(folder).unwrap());
     assert_eq!(again, in_memory, "{failure:?}");
-    let without_cursors = |mut kept: Kept| {
-        kept.sessions.values_mut().for_each(|saved| saved.cursor = Cursor::default());
-        kept
+    let without_cursors = |mut contents: Contents| {
+        contents.sessions.values_mut().for_each(|saved| saved.cursor = Cursor::default());
+        contents
     };
-    assert_eq!(without_cursors(again), without_cursors(kept), "{failure:?}");
+    assert_eq!(without_cursors(again), without_cursors(contents), "{failure:?}");
     refused
 }
 
@@ -280,7 +284,7 @@ fn power_full_and_failing_disks_refuse_and_later_writes_succeed() {
     for point in 0..points {
         let at = point * writes / points;
         let kind = [ErrorKind::StorageFull, ErrorKind::Other][point % 2];
-        // Once, or for a while as on a full disk.
+        // A single failure, or several as on a full disk.
         refused += with_failure(&begin, folder.path(), (at, [1, 1, 25][point % 3], kind));
     }
     assert!(refused > points / 2, "{refused}");

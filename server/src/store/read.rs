@@ -1,4 +1,4 @@
-//! Reading what is in the database: all of it when a server starts, and for commands that only look.
+//! Reads the database: everything when a server starts, and for commands without write access.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -18,47 +18,47 @@ use sightline_session::view::SavedSession;
 
 use super::disk::Outcome;
 use super::open::{builder, failed, refused};
-use super::record::{CURSORS, NOTES, Place, RUNS, SESSIONS, USED, all_numbered, decode};
+use super::record::{CURSORS, NOTES, RUNS, RecordKey, SESSIONS, USED, all_numbered, decode};
 use super::salvage::Salvaged;
 use super::{FILE_NAME, LAST_SESSION, META, id_of};
 
-/// How often a file is copied that a starting server may be changing.
+/// Number of copies that are tried while a starting server may be changing the file.
 const COPIES: u32 = 3;
 
-/// What was found.
+/// The contents of the database.
 #[derive(Debug, Default)]
 pub struct Found {
     /// The sessions that can be read.
     pub sessions: Vec<SavedSession>,
-    /// Their notes, by the sessions' numbers.
+    /// Their notes, by session number.
     pub notes: BTreeMap<u64, Notes>,
-    /// When they were used last, RFC 3339, by the sessions' numbers.
+    /// Times of last use, RFC 3339, by session number.
     pub used: BTreeMap<u64, String>,
-    /// One sentence for everything that a person should know.
+    /// Messages for the user, one sentence each.
     pub messages: Vec<String>,
-    /// The largest number that a session ever had here.
+    /// The largest session number so far.
     pub last_number: u64,
-    /// Sessions that cannot be read, and why.
+    /// Unreadable sessions, with the reason.
     pub(super) damaged: Vec<(String, String)>,
 }
 
-/// What a folder holds, without changing it, also while a server works in it and after one that was killed.
+/// Reads the database of a folder without changing it, even while a server uses it or after a crash.
 ///
 /// # Errors
-/// No database there, or one that cannot be read.
+/// The database is missing or cannot be read.
 pub(crate) fn read_only(folder: &Path) -> Result<Found> {
     let path = folder.join(FILE_NAME);
     let mut builder = builder();
-    // The check would write.
+    // The integrity check would write.
     builder.set_check_integrity_on_open(false);
     for _ in 0..COPIES {
         match builder.open_read_only(&path) {
             Ok(database) => {
                 return read(&database).map_err(|error| failed(&path, &error.to_string()));
             }
-            // No server is there, and the last one did not end in order: the file is repaired in memory.
+            // No server is running, and the last one crashed: the file is repaired in memory.
             Err(DatabaseError::RepairAborted) => {}
-            // What can be verified in a damaged file is found below.
+            // The verifiable records of a damaged file are recovered below.
             Err(DatabaseError::Storage(StorageError::Corrupted(_))) => {}
             Err(error) => return Err(refused(&path, &error)),
         }
@@ -66,7 +66,7 @@ pub(crate) fn read_only(folder: &Path) -> Result<Found> {
         if let Some(found) = repaired(&bytes) {
             return Ok(found);
         }
-        // A server may have started while the file was copied.
+        // A server may have started during the copy.
     }
     let bytes = std::fs::read(&path).map_err(|source| Error::Read { path: path.clone(), source })?;
     let salvaged = Salvaged::of(&bytes);
@@ -76,18 +76,18 @@ pub(crate) fn read_only(folder: &Path) -> Result<Found> {
     Ok(found)
 }
 
-/// What the bytes of a database hold after a repair; none where it is damaged beyond it.
+/// Repairs the bytes of a database in memory and reads it; `None` if the damage is too severe.
 fn repaired(bytes: &[u8]) -> Option<Found> {
     let open = || {
         let storage = InMemoryBackend::new();
         storage.set_len(bytes.len() as u64)?;
         storage.write(0, bytes)?;
         let mut builder = builder();
-        // Nobody shares the memory.
+        // The memory is not shared.
         builder.set_concurrency_mode(ConcurrencyMode::ExclusiveWriter);
         read(&builder.create_with_backend(storage)?)
     };
-    // The library panics at some damage.
+    // redb panics at some kinds of damage.
     catch_unwind(AssertUnwindSafe(open)).ok()?.ok()
 }
 
@@ -107,18 +107,18 @@ pub(super) fn read(database: &impl ReadableDatabase) -> Outcome<Found> {
     }
     for entry in transaction.open_table(NOTES)?.iter()? {
         let (key, value) = entry?;
-        match parsed(&Place::Notes(key.value()), value.value()) {
+        match parsed(&RecordKey::Notes(key.value()), value.value()) {
             Ok(notes) => {
                 found.notes.insert(key.value(), notes);
             }
             Err(why) => found.damaged.push((id_of(key.value()), format!("its notes: {why}"))),
         }
     }
-    // A time that cannot be read is no reason to lose anything.
+    // An unreadable time must not cause the loss of other data.
     for (number, json) in all_numbered(&transaction, USED)? {
         found.used.extend(serde_json::from_slice(&json).map(|time: String| (number, time)));
     }
-    // A session of which one thing cannot be read is moved aside once, with everything.
+    // A session with any unreadable part is moved aside once, as a whole.
     found.damaged.sort();
     found.damaged.dedup_by(|later, earlier| later.0 == earlier.0);
     let is_damaged = |id: &str| found.damaged.iter().any(|(damaged, _)| damaged == id);
@@ -136,13 +136,13 @@ impl std::fmt::Display for Unreadable {
     }
 }
 
-/// A session put together from its parts.
+/// Assembles a session from its records.
 fn session(
     transaction: &ReadTransaction,
     number: u64,
     head: &[u8],
 ) -> Outcome<std::result::Result<SavedSession, Unreadable>> {
-    let (mut saved, runs) = match head_of(&Place::Session(number), head) {
+    let (mut saved, runs) = match head_of(&RecordKey::Session(number), head) {
         Ok(head) => head,
         Err(why) => return Ok(Err(why)),
     };
@@ -150,15 +150,15 @@ fn session(
         return Ok(Err(Unreadable(format!("it holds session {}", crate::printable::printable(&saved.id)))));
     }
     if let Some(cursor) = transaction.open_table(CURSORS)?.get(number)? {
-        // A cursor that cannot be read is no reason to lose the session.
-        saved.cursor = parsed::<Cursor>(&Place::Cursor(number), cursor.value()).unwrap_or_default();
+        // An unreadable cursor must not cause the loss of the session.
+        saved.cursor = parsed::<Cursor>(&RecordKey::Cursor(number), cursor.value()).unwrap_or_default();
     }
     let range = (number, 0, 0)..=(number, u64::MAX, u64::MAX);
     for entry in transaction.open_table(RUNS)?.range(range)? {
         let (key, value) = entry?;
         let (_, target, run) = key.value();
-        let place = saved.targets.get_mut(target as usize).filter(|record| record.runs.len() as u64 == run);
-        match (place, parsed(&Place::Run(key.value()), value.value())) {
+        let slot = saved.targets.get_mut(target as usize).filter(|record| record.runs.len() as u64 == run);
+        match (slot, parsed(&RecordKey::Run(key.value()), value.value())) {
             (Some(record), Ok(read)) => record.runs.push(read),
             (None, _) => return Ok(Err(Unreadable(format!("run {run} of target {target} has no place")))),
             (_, Err(why)) => return Ok(Err(Unreadable(format!("run {run} of target {target}: {why}")))),
@@ -171,31 +171,31 @@ fn session(
     Ok(Ok(saved))
 }
 
-/// A session as it is stored, with the number of runs of each target; an earlier version did not store these.
+/// A stored session with the number of runs of each target; `None` in the format of an earlier version.
 pub(super) fn head_of(
-    place: &Place,
+    record_key: &RecordKey,
     bytes: &[u8],
 ) -> std::result::Result<(SavedSession, Option<Vec<usize>>), Unreadable> {
     if bytes.starts_with(b"[") {
-        parsed::<(SavedSession, Vec<usize>)>(place, bytes).map(|(saved, runs)| (saved, Some(runs)))
+        parsed::<(SavedSession, Vec<usize>)>(record_key, bytes).map(|(saved, runs)| (saved, Some(runs)))
     } else {
-        parsed(place, bytes).map(|saved| (saved, None))
+        parsed(record_key, bytes).map(|saved| (saved, None))
     }
 }
 
-/// Everything of a session as one JSON text, whether or not it can be understood.
+/// All records of a session as one JSON text, readable or not.
 pub(super) fn raw(database: &impl ReadableDatabase, number: u64) -> Outcome<String> {
     let transaction = database.begin_read()?;
-    let text = |place: Place, bytes: &[u8]| {
+    let text = |record_key: RecordKey, bytes: &[u8]| {
         let lossy = || Value::String(String::from_utf8_lossy(bytes).into_owned());
-        let json = decode(&place, bytes).unwrap_or(bytes);
+        let json = decode(&record_key, bytes).unwrap_or(bytes);
         serde_json::from_slice(json).unwrap_or_else(|_| lossy())
     };
     let mut whole = serde_json::Map::new();
     for (name, table) in [("session", SESSIONS), ("cursor", CURSORS), ("notes", NOTES)] {
         if let Some(value) = transaction.open_table(table)?.get(number)? {
-            let place = Place::numbered(redb::TableHandle::name(&table), number);
-            whole.extend(place.map(|place| (name.to_owned(), text(place, value.value()))));
+            let record_key = RecordKey::numbered(redb::TableHandle::name(&table), number);
+            whole.extend(record_key.map(|record_key| (name.to_owned(), text(record_key, value.value()))));
         }
     }
     let mut runs = Vec::new();
@@ -203,14 +203,14 @@ pub(super) fn raw(database: &impl ReadableDatabase, number: u64) -> Outcome<Stri
     for entry in transaction.open_table(RUNS)?.range(range)? {
         let (key, value) = entry?;
         let (_, target, run) = key.value();
-        let saved = text(Place::Run(key.value()), value.value());
+        let saved = text(RecordKey::Run(key.value()), value.value());
         runs.push(serde_json::json!({ "target": target, "run": run, "saved": saved }));
     }
     whole.insert("runs".to_owned(), runs.into());
     Ok(format!("{:#}", Value::Object(whole)))
 }
 
-fn parsed<T: DeserializeOwned>(place: &Place, bytes: &[u8]) -> std::result::Result<T, Unreadable> {
-    let json = decode(place, bytes).map_err(|altered| Unreadable(altered.to_string()))?;
+fn parsed<T: DeserializeOwned>(record_key: &RecordKey, bytes: &[u8]) -> std::result::Result<T, Unreadable> {
+    let json = decode(record_key, bytes).map_err(|altered| Unreadable(altered.to_string()))?;
     serde_json::from_slice(json).map_err(|error| Unreadable(error.to_string()))
 }

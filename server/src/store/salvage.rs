@@ -1,7 +1,7 @@
-//! What can be verified in a damaged file: its records, found without its trees by the lines behind them.
+//! Recovers the verifiable records of a damaged file, found by their verification lines instead of its trees.
 //!
-//! Of each place the newest record counts. One that was altered is left out; then an older copy of it may be found, which
-//! the database had not overwritten yet. What was removed stays removed.
+//! The newest record of each place is used. If it is corrupted, an older copy may be found that the database has not
+//! overwritten yet. Removed records stay removed.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,66 +11,66 @@ use redb::{ConcurrencyMode, Database};
 use super::disk::{Outcome, SEQUENCE};
 use super::open::{builder, prepare};
 use super::read::head_of;
-use super::record::{Place, Record, encode, scan};
+use super::record::{Record, RecordKey, encode, scan};
 use super::{LAST_SESSION, META, id_of, number_of};
 
-/// Records for a new database.
+/// Recovered records for a new database.
 #[derive(Debug, Default)]
 pub(super) struct Salvaged {
-    /// JSON texts by their places.
-    records: BTreeMap<Place, Vec<u8>>,
-    /// Sessions of which parts were found, but not the session itself.
+    /// JSON texts by place.
+    records: BTreeMap<RecordKey, Vec<u8>>,
+    /// Sessions with recovered parts, but without the session record itself.
     lost: BTreeSet<u64>,
     last_session: u64,
     last_sequence: u64,
 }
 
 impl Salvaged {
-    /// What is found in the bytes of a file.
+    /// Recovers the records in the bytes of a file.
     pub(super) fn of(bytes: &[u8]) -> Self {
         let found = scan(bytes);
-        let removed_at = |place: &Place| {
-            let removal = found.get(&Place::Removed(place.to_string()));
+        let removed_at = |record_key: &RecordKey| {
+            let removal = found.get(&RecordKey::Removed(record_key.to_string()));
             removal.map_or(0, |record| record.sequence)
         };
         let is_there = |record: &Record<'_>| {
-            let session = session_of(&record.place).map_or(0, |number| removed_at(&Place::Session(number)));
-            record.sequence > removed_at(&record.place).max(session)
+            let session = session_of(&record.key).map_or(0, |number| removed_at(&RecordKey::Session(number)));
+            record.sequence > removed_at(&record.key).max(session)
         };
         let mut salvaged = Self::default();
         for record in found.values() {
             salvaged.last_sequence = salvaged.last_sequence.max(record.sequence);
-            let session = match &record.place {
-                Place::Removed(name) => name.parse().ok().and_then(|place| session_of(&place)),
-                place => session_of(place),
+            let session = match &record.key {
+                RecordKey::Removed(name) => name.parse().ok().and_then(|record_key| session_of(&record_key)),
+                record_key => session_of(record_key),
             };
             salvaged.last_session = salvaged.last_session.max(session.unwrap_or(0));
-            if matches!(record.place, Place::Removed(_)) || !is_there(record) {
+            if matches!(record.key, RecordKey::Removed(_)) || !is_there(record) {
                 continue;
             }
-            // A session with its parts, or something by itself.
+            // A session with its parts, or an independent record.
             let runs = session.map(|number| {
-                let head = found.get(&Place::Session(number)).filter(|head| is_there(head));
-                head.map(|head| head_of(&head.place, head.json).ok().and_then(|(_, runs)| runs))
+                let head = found.get(&RecordKey::Session(number)).filter(|head| is_there(head));
+                head.map(|head| head_of(&head.key, head.json).ok().and_then(|(_, runs)| runs))
             });
-            match (runs, &record.place) {
+            match (runs, &record.key) {
                 (Some(None), _) => salvaged.lost.extend(session),
-                // Of a run that the session has no more an older copy was found.
-                (Some(Some(Some(runs))), Place::Run((_, target, run)))
+                // Ignores an older copy of a run that is not part of the session.
+                (Some(Some(Some(runs))), RecordKey::Run((_, target, run)))
                     if runs.get(*target as usize).is_none_or(|count| *count as u64 <= *run) => {}
                 _ => {
-                    salvaged.records.insert(record.place.clone(), record.json.to_vec());
+                    salvaged.records.insert(record.key.clone(), record.json.to_vec());
                 }
             }
         }
         salvaged
     }
 
-    /// Writes the records into a new database.
+    /// Writes the records to a new database.
     pub(super) fn fill(&self, database: &Database) -> Outcome<()> {
         let transaction = database.begin_write()?;
-        for (place, json) in &self.records {
-            place.set(&transaction, Some(&encode(place, self.last_sequence, json)))?;
+        for (record_key, json) in &self.records {
+            record_key.set(&transaction, Some(&encode(record_key, self.last_sequence, json)))?;
         }
         {
             let mut meta = transaction.open_table(META)?;
@@ -80,10 +80,10 @@ impl Salvaged {
         Ok(transaction.commit()?)
     }
 
-    /// A database in memory with the records.
+    /// An in-memory database with the records.
     pub(super) fn in_memory(&self) -> Outcome<Database> {
         let mut builder = builder();
-        // Nobody shares the memory.
+        // The memory is not shared.
         builder.set_concurrency_mode(ConcurrencyMode::ExclusiveWriter);
         let database = builder.create_with_backend(InMemoryBackend::new())?;
         prepare(&database)?;
@@ -91,15 +91,16 @@ impl Salvaged {
         Ok(database)
     }
 
-    /// What was found, half a sentence.
+    /// A summary of the recovered records, as part of a sentence.
     pub(super) fn summary(&self) -> String {
-        let count = |is_one: fn(&Place) -> bool, one: &str, more: &str| {
-            let count = self.records.keys().filter(|place| is_one(place)).count();
+        let count = |is_one: fn(&RecordKey) -> bool, one: &str, more: &str| {
+            let count = self.records.keys().filter(|record_key| is_one(record_key)).count();
             format!("{count} {}", if count == 1 { one } else { more })
         };
-        let sessions = count(|place| matches!(place, Place::Session(_)), "session", "sessions");
-        let documents = count(|place| matches!(place, Place::Document(_)), "document", "documents");
-        let studies = count(|place| matches!(place, Place::Study(_)), "study", "studies");
+        let sessions = count(|record_key| matches!(record_key, RecordKey::Session(_)), "session", "sessions");
+        let documents =
+            count(|record_key| matches!(record_key, RecordKey::Document(_)), "document", "documents");
+        let studies = count(|record_key| matches!(record_key, RecordKey::Study(_)), "study", "studies");
         let mut text = format!("{sessions}, {documents} and {studies} were taken over from it");
         if !self.lost.is_empty() {
             let lost: Vec<String> = self.lost.iter().map(|number| id_of(*number)).collect();
@@ -110,14 +111,15 @@ impl Salvaged {
     }
 }
 
-/// The session to which a place belongs.
-fn session_of(place: &Place) -> Option<u64> {
-    match place {
-        Place::Session(number) | Place::Cursor(number) | Place::Notes(number) | Place::Used(number) => {
-            Some(*number)
-        }
-        Place::Run((session, _, _)) => Some(*session),
-        Place::Question(name) => number_of(name.split('/').next().unwrap_or_default()),
-        Place::Study(_) | Place::Document(_) | Place::Drive(_) | Place::Removed(_) => None,
+/// The session that a place is part of.
+fn session_of(record_key: &RecordKey) -> Option<u64> {
+    match record_key {
+        RecordKey::Session(number)
+        | RecordKey::Cursor(number)
+        | RecordKey::Notes(number)
+        | RecordKey::Used(number) => Some(*number),
+        RecordKey::Run((session, _, _)) => Some(*session),
+        RecordKey::Question(name) => number_of(name.split('/').next().unwrap_or_default()),
+        RecordKey::Study(_) | RecordKey::Document(_) | RecordKey::Drive(_) | RecordKey::Removed(_) => None,
     }
 }

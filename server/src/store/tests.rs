@@ -1,6 +1,6 @@
-//! The database: what comes back, what is moved aside, and that nothing is lost on the way.
+//! Tests of the database: contents after a restart, damaged files, and recovery.
 
-use super::cursors::CURSOR_PERIOD;
+use super::deferred_writes::CURSOR_PERIOD;
 use super::*;
 use redb::{Database, ReadableDatabase};
 use sightline_session::documents::Document;
@@ -33,7 +33,7 @@ fn sessions(folder: &Path) -> Found {
 }
 
 #[test]
-fn a_session_comes_back_with_its_runs_cursor_and_notes_bit_for_bit() {
+fn a_session_round_trips_bit_for_bit() {
     let folder = tempfile::tempdir().unwrap();
     let mut notes = Notes::default();
     {
@@ -55,7 +55,7 @@ fn a_session_comes_back_with_its_runs_cursor_and_notes_bit_for_bit() {
 }
 
 #[test]
-fn a_run_that_is_taken_out_of_a_session_is_taken_out_of_the_database() {
+fn a_run_removed_from_a_session_is_removed_from_the_database() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).unwrap();
     store.save(&saved("s1")).unwrap();
@@ -66,7 +66,7 @@ fn a_run_that_is_taken_out_of_a_session_is_taken_out_of_the_database() {
 }
 
 #[test]
-fn a_cursor_is_on_disk_soon_although_nobody_asks_for_it() {
+fn a_cursor_is_written_without_a_flush() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).unwrap();
     store.save(&saved("s1")).unwrap();
@@ -79,7 +79,7 @@ fn a_cursor_is_on_disk_soon_although_nobody_asks_for_it() {
 }
 
 #[test]
-fn json_files_of_an_earlier_version_are_read_in_once_and_kept() {
+fn json_files_of_an_earlier_version_are_imported_once() {
     let folder = tempfile::tempdir().unwrap();
     let text = serde_json::to_vec_pretty(&saved("s2")).unwrap();
     std::fs::write(folder.path().join("s2.json"), &text).unwrap();
@@ -87,12 +87,12 @@ fn json_files_of_an_earlier_version_are_read_in_once_and_kept() {
     std::fs::write(folder.path().join("notes.txt"), b"mine").unwrap();
     let found = sessions(folder.path());
     assert_eq!((found.sessions, found.last_number), (vec![saved("s2")], 7));
-    let said = found.messages.join("\n");
-    assert!(said.contains("s2.json") && said.contains("s7.json"), "{said}");
+    let messages = found.messages.join("\n");
+    assert!(messages.contains("s2.json") && messages.contains("s7.json"), "{messages}");
     assert_eq!(std::fs::read(folder.path().join("s2.imported")).unwrap(), text);
     assert_eq!(std::fs::read(folder.path().join("s7.damaged")).unwrap(), b"{\"format\": 1, \"id\"");
     assert!(folder.path().join("notes.txt").is_file());
-    // A file of the same name that turns up later does not replace what was done since.
+    // A file of the same name that appears later does not replace newer data.
     let mut older = saved("s2");
     older.targets.clear();
     std::fs::write(folder.path().join("s2.json"), serde_json::to_vec(&older).unwrap()).unwrap();
@@ -100,8 +100,8 @@ fn json_files_of_an_earlier_version_are_read_in_once_and_kept() {
     assert!(folder.path().join("s2.imported-2").is_file());
 }
 
-/// What the version 0.1.0 of 2026-11-23 left in form 1: a session with two targets, a fork of a run, a note, a breakpoint and
-/// a cursor, another whose only target was removed, and a document.
+/// The database of version 0.1.0 of 2026-11-23 in format 1: a session with two targets, a fork of a run, a note, a
+/// breakpoint and a cursor, another session whose only target was removed, and a document.
 #[test]
 fn a_database_of_form_1_opens_and_its_records_are_all_there() {
     let folder = tempfile::tempdir().unwrap();
@@ -140,7 +140,7 @@ fn a_file_without_a_whole_record_is_moved_aside() {
     Store::open(whole.path()).unwrap().save(&saved("s1")).unwrap();
     let good = std::fs::read(whole.path().join(FILE_NAME)).unwrap();
     let mut flipped = good.clone();
-    // Every page that holds something loses a few bytes.
+    // Overwrites a few bytes of every non-empty page.
     flipped
         .chunks_mut(4096)
         .filter(|page| page.iter().any(|byte| *byte != 0))
@@ -161,7 +161,7 @@ fn a_file_without_a_whole_record_is_moved_aside() {
     }
 }
 
-/// Fills a store with six sessions, and all else that is kept.
+/// Fills a store with six sessions and one or more of all other records.
 fn fill(store: &Store) -> Found {
     for number in 1..=6 {
         let id = id_of(number);
@@ -191,7 +191,7 @@ fn one_flipped_bit_costs_at_most_one_session() {
     let store = Store::open(whole.path()).unwrap();
     let expected = fill(&store);
     assert_eq!((expected.sessions.len(), expected.last_number), (5, 6));
-    // As a killed server leaves the file, and an orderly end.
+    // The file after a crash, and after an orderly shutdown.
     let killed = std::fs::read(whole.path().join(FILE_NAME)).unwrap();
     drop(store);
     let ended = std::fs::read(whole.path().join(FILE_NAME)).unwrap();
@@ -218,7 +218,7 @@ fn one_flipped_bit_costs_at_most_one_session() {
         older += usize::from(found.sessions.len() == 5 && !is_whole);
         lost += usize::from(found.sessions.len() < 5);
         assert!(store.documents().unwrap().len() + 1 >= 2, "{context}");
-        // Work goes on.
+        // The store remains usable.
         store.save(&saved("s9")).unwrap();
         drop(store);
         assert!(Store::open(folder.path()).unwrap().load().unwrap().sessions.contains(&saved("s9")));
@@ -231,7 +231,7 @@ fn one_flipped_bit_costs_at_most_one_session() {
 }
 
 #[test]
-fn an_empty_database_is_told() {
+fn an_empty_database_gives_a_notice() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join(FILE_NAME), b"").unwrap();
     let found = sessions(folder.path());
@@ -241,12 +241,12 @@ fn an_empty_database_is_told() {
 }
 
 #[test]
-fn a_session_that_cannot_be_understood_is_moved_into_a_file_and_the_others_stay() {
+fn an_unreadable_session_is_moved_into_a_file() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).unwrap();
     store.save(&saved("s1")).unwrap();
     store.save(&saved("s2")).unwrap();
-    store.disk.write(|write| write.put(Place::Run((2, 0, 1)), &"nonsense").map(|_| ())).unwrap();
+    store.disk.write(|write| write.put(RecordKey::Run((2, 0, 1)), &"nonsense").map(|_| ())).unwrap();
     let found = store.load().unwrap();
     assert_eq!(found.sessions, vec![saved("s1")]);
     assert!(found.messages[0].contains("session s2") && found.messages[0].contains("run 1 of target 0"));
@@ -270,7 +270,7 @@ fn a_database_of_a_newer_version_is_left_alone() {
 }
 
 #[test]
-fn a_document_is_replaced_only_by_whom_has_read_it() {
+fn a_document_is_replaced_only_at_its_current_revision() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).unwrap();
     let put = |value: i32, revision| store.put_document("layout", value.into(), revision).unwrap();
@@ -286,7 +286,7 @@ fn a_document_is_replaced_only_by_whom_has_read_it() {
 }
 
 #[test]
-fn only_the_very_form_of_a_name_is_one() {
+fn only_canonical_session_names_are_accepted() {
     assert_eq!(number_of("s12"), Some(12));
     for id in ["", "s", "s01", "s+1", "s-1", "S1", "s1/", "../s1"] {
         assert_eq!(number_of(id), None, "{id}");

@@ -1,7 +1,7 @@
-//! Charts as SVG text, drawn by `plotters`: lines with their range over the worlds, and values of the paper beside them.
+//! Charts as SVG text, drawn by `plotters`: lines with their range over the worlds, and the paper's values.
 //!
-//! Colours are those of Okabe and Ito, told apart by everyone, and each goes with a shape; the paper's values are hollow
-//! squares in the colour of the configuration that they belong to. Lines that lie upon each other are one, with all names.
+//! Colours are those of Okabe and Ito, distinguishable with any colour vision, each with its own marker shape; the paper's
+//! values are hollow squares in the colour of their configuration. Coinciding lines are merged into one, with all labels.
 
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
@@ -18,67 +18,67 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(90, 90, 90),
 ];
 
-/// More words than these along the axis stand in two rows in turn.
+/// If there are more words than this along the axis, they alternate between two rows.
 const MOST_LEVEL_WORDS: usize = 5;
 
-/// From one row of words along the axis to the next, px.
+/// Spacing of rows of words along the axis, px.
 const WORD_ROW: i32 = 15;
 
-/// Width of a chart and its least height, px.
+/// Width and minimum height of a chart, px.
 const SIZE: (u32, u32) = (1000, 420);
 
-/// Width of the plot, px; the legend has the rest.
+/// Width of the plot, px; the rest is the legend.
 const PLOT_WIDTH: u32 = 640;
 
-/// Letters that fit into a row of the legend.
+/// Maximum number of letters in a row of the legend.
 const LEGEND_LETTERS: usize = 46;
 
-/// From one row of the legend to the next, and from the top to the first, px.
+/// Spacing of legend rows, and distance of the first from the top, px.
 const LEGEND_ROW: i32 = 18;
 const LEGEND_TOP: i32 = 44;
 
-/// A line of more points than these is drawn without marks.
+/// Maximum number of points of a line drawn with markers.
 const MOST_MARKS: usize = 40;
 
 /// A line with its points.
 #[derive(Clone, Debug, Default)]
 pub struct Line {
-    /// What it is called.
+    /// Label in the legend.
     pub label: String,
-    /// Which colour it has.
+    /// Index of the colour.
     pub colour: usize,
-    /// Its points.
+    /// Points (x, y).
     pub points: Vec<(f64, f64)>,
-    /// For points of the line: their least and greatest value over the worlds.
+    /// Minimum and maximum over the worlds at some x.
     pub ranges: Vec<(f64, [f64; 2])>,
-    /// Whether it is thin and without marks: an expectation, not a measurement.
+    /// Whether the line is thin and without markers: an expected value or gate, not a measurement.
     pub is_thin: bool,
-    /// Whether only its marks are drawn: hollow squares.
+    /// Whether only hollow square markers are drawn.
     pub is_marks: bool,
-    /// Whether its points are not joined, because nothing lies between them.
+    /// Whether the points are not connected, because intermediate values have no meaning.
     pub is_apart: bool,
 }
 
 /// A chart.
 #[derive(Clone, Debug, Default)]
 pub struct Chart {
-    /// Its title.
+    /// Title.
     pub title: String,
-    /// What the axes show, with their units.
+    /// Axis labels with units, horizontal and vertical.
     pub axes: [String; 2],
-    /// The words along the horizontal axis at 0, 1, 2, …; none for numbers.
+    /// Words along the horizontal axis at 0, 1, 2, …; empty for numbers.
     pub words: Vec<String>,
-    /// The vertical range, where it does not follow from the data.
+    /// Vertical range; `None` to derive it from the data.
     pub y_range: Option<[f64; 2]>,
-    /// Its lines.
+    /// Lines.
     pub lines: Vec<Line>,
 }
 
 impl Chart {
-    /// The chart as the text of an SVG file.
+    /// Renders the chart as SVG.
     ///
     /// # Errors
-    /// What the drawing library says.
+    /// The message of the drawing library.
     pub fn svg(&self) -> Result<String, String> {
         let mut text = String::new();
         {
@@ -125,15 +125,15 @@ impl Chart {
                 TextStyle::from(("sans-serif", 12).into_font()).pos(Pos::new(HPos::Center, VPos::Top));
             for (i, word) in self.words.iter().enumerate() {
                 let (column, row) = chart.backend_coord(&(i as f64, y[0]));
-                let place = (column, row + 6 + WORD_ROW * (i % 2) as i32);
-                let text = Text::new(word.as_str(), place, style.clone());
+                let position = (column, row + 6 + WORD_ROW * (i % 2) as i32);
+                let text = Text::new(word.as_str(), position, style.clone());
                 area.draw(&text).map_err(|e| e.to_string())?;
             }
         }
         self.lines.iter().try_for_each(|line| draw(&mut chart, line, [x, y])).map_err(|e| e.to_string())
     }
 
-    /// What the colours mean, beside the plot so that it hides nothing.
+    /// Draws the legend next to the plot, where it hides nothing.
     fn legend(&self, area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>) -> Result<(), String> {
         let mut y = LEGEND_TOP;
         for line in &self.lines {
@@ -159,7 +159,7 @@ impl Chart {
         Ok(())
     }
 
-    /// Room below the plot, px.
+    /// Height of the labels below the plot, px.
     fn label_height(&self) -> u32 {
         match self.words.len() {
             0 => 40,
@@ -168,7 +168,7 @@ impl Chart {
         }
     }
 
-    /// The ranges of both axes, with some air.
+    /// The ranges of both axes, with a margin.
     fn ranges(&self) -> [[f64; 2]; 2] {
         let of = |values: &mut dyn Iterator<Item = f64>| {
             let [low, high] = values
@@ -194,7 +194,7 @@ impl Line {
         !self.is_thin && self.points.len() <= MOST_MARKS
     }
 
-    /// Whether another line is drawn over this one, point by point.
+    /// Whether another line has the same points.
     fn coincides(&self, other: &Self) -> bool {
         let same = |a: f64, b: f64| (a - b).abs() <= 1e-9 * a.abs().max(1.0);
         !self.points.is_empty()
@@ -203,7 +203,7 @@ impl Line {
     }
 }
 
-/// The lines with those that lie upon each other made one, called by all their names.
+/// Merges coinciding lines and joins their labels.
 pub fn merged(lines: Vec<Line>) -> Vec<Line> {
     let mut found: Vec<Line> = Vec::new();
     for line in lines {
@@ -218,7 +218,7 @@ pub fn merged(lines: Vec<Line>) -> Vec<Line> {
     found
 }
 
-/// A label in rows that fit into the legend, broken between words.
+/// Wraps a label into rows of the legend.
 fn rows_of(label: &str) -> Vec<String> {
     let mut rows: Vec<String> = vec![String::new()];
     for word in label.split(' ') {
@@ -233,13 +233,13 @@ fn rows_of(label: &str) -> Vec<String> {
     rows
 }
 
-/// A number along an axis, without decimals where it has none.
+/// A number on an axis, without trailing decimals.
 fn number(value: f64) -> String {
     let rounded = (value * 1000.0).round() / 1000.0;
     if rounded == 0.0 { "0".to_owned() } else { rounded.to_string() }
 }
 
-/// The corners of a line's mark about a point, px: a hexagon, a square, a triangle, a diamond, and so on.
+/// The corners of a line's marker around a point, px: a hexagon, a square, a triangle, a diamond, and so on.
 fn mark(colour: usize, (x, y): (i32, i32)) -> Vec<(i32, i32)> {
     let corners: &[(i32, i32)] = match colour % 5 {
         0 => &[(-5, 0), (-3, -4), (3, -4), (5, 0), (3, 4), (-3, 4)],
@@ -255,7 +255,7 @@ type Plot<'a, 'b> = ChartContext<'b, SVGBackend<'a>, Cartesian2d<RangedCoordf64,
 
 fn draw(chart: &mut Plot<'_, '_>, line: &Line, [x, y]: [[f64; 2]; 2]) -> Result<(), String> {
     let colour = COLOURS[line.colour % COLOURS.len()];
-    // What left the frame would be bent at its border.
+    // Points outside the frame would be clamped to its border.
     let is_inside =
         |point: &&(f64, f64)| (x[0]..=x[1]).contains(&point.0) && (y[0]..=y[1]).contains(&point.1);
     let points: Vec<(f64, f64)> = line.points.iter().filter(is_inside).copied().collect();

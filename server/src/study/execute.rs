@@ -1,7 +1,7 @@
-//! Carries out a study: world after world is made, rendered where anything is missing, and tracked unit by unit.
+//! Executes a study: creates one world after another, renders missing images, and tracks unit by unit.
 //!
-//! Where so many worlds are asked for, one that offers fewer targets than its scenario asks for is passed over, which
-//! depends on its surface and its light alone; seeds that were named are taken as they are.
+//! If a number of worlds is requested, a world with fewer targets than its scenario requires is skipped, which depends only
+//! on its surface and its illumination. Explicit seeds are always used.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -23,90 +23,94 @@ use super::order::{Order, Seeds};
 use super::report;
 use super::tables;
 
-/// Seeds that are tried for each world asked for.
+/// Number of seeds tried per requested world.
 const SEEDS_PER_WORLD: u64 = 10;
 
-/// Share of the work that is rendering, where no world is rendered yet.
+/// Fraction of the work spent on rendering, if no world is rendered yet.
 const RENDERING: f64 = 0.5;
 
-/// How far a study has come.
+/// Progress of a study.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Progress {
-    /// Units done, of all.
+    /// Finished units.
     Units {
-        /// Done.
+        /// Number of finished units.
         k: usize,
-        /// All.
+        /// Number of all units.
         n: usize,
-        /// Share of the work that is done, from 0 to 1.
+        /// Finished fraction of the work, 0 to 1.
         share: f64,
     },
-    /// Stops of a world rendered, of those that were missing.
+    /// Rendered stops of a world, out of the missing ones.
     Rendering {
         /// The world.
         world: String,
-        /// Done.
+        /// Number of rendered stops.
         k: usize,
-        /// All.
+        /// Number of missing stops at the start.
         n: usize,
-        /// Share of the work that is done, from 0 to 1.
+        /// Finished fraction of the work, 0 to 1.
         share: f64,
     },
-    /// Rows that were found or kept.
+    /// New or cached rows.
     Rows(Vec<Row>),
-    /// Something that a person should know, as a sentence.
+    /// A message for the user, as a sentence.
     Notice(String),
 }
 
-/// What a study found.
+/// The results of a study.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// The units, by configuration, point and world.
     pub units: Vec<Unit>,
     /// The table.
     pub rows: Vec<Row>,
-    /// The report, a whole HTML page.
+    /// The report, a complete HTML page.
     pub report: String,
-    /// How many units were found in this run; the others were kept.
+    /// Number of units computed in this execution; the others were cached.
     pub found: usize,
 }
 
-/// Carries out a study and writes its tables and its report.
+/// Executes a study and writes its tables and its report.
 ///
 /// # Errors
 /// Bad input, a folder that cannot be written, or [`Error::Cancelled`] soon after `cancel` is set.
-pub fn carry_out(mut order: Order, cancel: &AtomicBool, tell: &(dyn Fn(Progress) + Sync)) -> Result<Outcome> {
-    take_other_scenario(&mut order)?;
+pub fn carry_out(
+    mut order: Order,
+    cancel: &AtomicBool,
+    notify: &(dyn Fn(Progress) + Sync),
+) -> Result<Outcome> {
+    replace_scenario(&mut order)?;
     let folder = order.folder.join(order.plan.study.name);
     let log = ResultLog::open(&folder)?;
-    log.notices.iter().for_each(|notice| tell(Progress::Notice(notice.clone())));
-    let conduct = Conduct {
+    log.notices.iter().for_each(|notice| notify(Progress::Notice(notice.clone())));
+    let execution = StudyExecution {
         order: &order,
         log,
         cancel,
-        tell,
+        notify,
         done: AtomicUsize::new(0),
         found: AtomicUsize::new(0),
         rendered: AtomicUsize::new(0),
     };
-    tell(Progress::Units { k: 0, n: conduct.all(), share: 0.0 });
+    notify(Progress::Units { k: 0, n: execution.all(), share: 0.0 });
     let mut units = Vec::new();
     for name in order.plan.scenarios() {
-        units.extend(conduct.scenario(name)?);
+        units.extend(execution.scenario(name)?);
     }
-    let place = |unit: &Unit| {
+    let sort_key = |unit: &Unit| {
         let configuration = order.plan.configurations.iter().position(|c| c.name == unit.configuration);
         (configuration, order.plan.points.iter().position(|point| *point == unit.point), unit.seed)
     };
-    units.sort_by_key(place);
+    units.sort_by_key(sort_key);
     let rows: Vec<Row> = units.iter().flat_map(|unit| rows(order.plan.study, unit)).collect();
     tables::write(&folder, &rows, &units)?;
     let report = report::write(&folder, &order, &units)?;
-    Ok(Outcome { units, rows, report, found: conduct.found.load(Ordering::Relaxed) })
+    Ok(Outcome { units, rows, report, found: execution.found.load(Ordering::Relaxed) })
 }
 
-/// Puts another scenario in the place of the study's own.
-fn take_other_scenario(order: &mut Order) -> Result<()> {
+/// Replaces the study's own scenario.
+fn replace_scenario(order: &mut Order) -> Result<()> {
     let Some((name, _)) = &order.scenario else { return Ok(()) };
     if order.plan.scenarios().len() > 1 {
         let problem = "this study compares several scenarios; none can take the place of all";
@@ -116,26 +120,26 @@ fn take_other_scenario(order: &mut Order) -> Result<()> {
     Ok(())
 }
 
-struct Conduct<'a> {
+struct StudyExecution<'a> {
     order: &'a Order,
     log: ResultLog,
     cancel: &'a AtomicBool,
-    tell: &'a (dyn Fn(Progress) + Sync),
+    notify: &'a (dyn Fn(Progress) + Sync),
     done: AtomicUsize,
     found: AtomicUsize,
-    /// Worlds whose stops are all rendered.
+    /// Number of completely rendered worlds.
     rendered: AtomicUsize,
 }
 
-/// One unit that is to be had.
+/// One unit to compute.
 struct Task<'a> {
     configuration: &'a Configuration,
     point: &'a Point,
     key: String,
 }
 
-impl Conduct<'_> {
-    /// All units of the points in one scenario.
+impl StudyExecution<'_> {
+    /// Computes all units of the points in one scenario.
     fn scenario(&self, name: &str) -> Result<Vec<Unit>> {
         let scenario = match &self.order.scenario {
             Some((_, scenario)) => scenario.clone(),
@@ -179,31 +183,31 @@ impl Conduct<'_> {
         }
     }
 
-    /// The units of one world; none where it is passed over.
+    /// Computes the units of one world; `None` if it is skipped.
     fn world(
         &self,
         name: &str,
         scenario: &Scenario,
         points: &[&Point],
-        is_named: bool,
+        is_explicit: bool,
     ) -> Result<Option<Vec<Unit>>> {
         let tasks = self.tasks(scenario, points)?;
-        // The same settings may have been kept under another name.
-        let kept_of = |task: &Task<'_>| {
+        // The same settings may be cached under another name.
+        let cached_unit = |task: &Task<'_>| {
             let configuration = task.configuration.name.clone();
             self.log.get(&task.key).map(|unit| Unit { configuration, ..unit.clone() })
         };
-        let kept: Vec<Unit> = tasks.iter().filter_map(kept_of).collect();
-        if kept.len() == tasks.len() {
+        let cached: Vec<Unit> = tasks.iter().filter_map(cached_unit).collect();
+        if cached.len() == tasks.len() {
             self.rendered.fetch_add(1, Ordering::Relaxed);
-            self.count(&kept);
-            return Ok(Some(kept));
+            self.count(&cached);
+            return Ok(Some(cached));
         }
         let world = format!("{name}/world-{}", scenario.seed);
         let traverse = create_simulated(scenario, &self.order.folder.join(&world))?;
         let mut chosen: Vec<(&Point, Vec<Chosen>)> = Vec::new();
         for &point in points {
-            // Without a fault the targets of all points are the same.
+            // Without a fault, the targets of all points are the same.
             let same = chosen.iter().find(|(other, _)| {
                 other.picks == point.picks && other.fault.is_none() && point.fault.is_none()
             });
@@ -212,15 +216,15 @@ impl Conduct<'_> {
                 None => picks::choose(&traverse, scenario, point)?,
             };
             if point.picks == Picks::Rule && of_point.len() < scenario.targets.wanted() as usize {
-                let outcome = if is_named { "taken as they are" } else { "passed over" };
-                (self.tell)(Progress::Notice(format!("{world}: {} targets, {outcome}", of_point.len())));
-                if !is_named {
+                let outcome = if is_explicit { "taken as they are" } else { "passed over" };
+                (self.notify)(Progress::Notice(format!("{world}: {} targets, {outcome}", of_point.len())));
+                if !is_explicit {
                     return Ok(None);
                 }
             }
             chosen.push((point, of_point));
         }
-        self.count(&kept);
+        self.count(&cached);
         self.render(&traverse, &world)?;
         let missing: Vec<&Task<'_>> = tasks.iter().filter(|task| self.log.get(&task.key).is_none()).collect();
         let drives = self.drives(&traverse, &missing)?;
@@ -234,10 +238,10 @@ impl Conduct<'_> {
                 self.unit([&traverse, drive], scenario, task, chosen)
             })
             .collect();
-        Ok(Some(kept.into_iter().chain(found?).collect()))
+        Ok(Some(cached.into_iter().chain(found?).collect()))
     }
 
-    /// The drives of a world with the uses of odometry that some tasks ask for.
+    /// The drives of a world with the uses of odometry in `tasks`.
     fn drives(&self, traverse: &Traverse, tasks: &[&Task<'_>]) -> Result<Vec<(OdometryMode, Traverse)>> {
         let mut drives: Vec<(OdometryMode, Traverse)> = Vec::new();
         for mode in tasks.iter().filter_map(|task| task.point.odometry) {
@@ -260,7 +264,7 @@ impl Conduct<'_> {
         Ok(tasks)
     }
 
-    /// One unit in a drive as it was planned and as it goes with the task's odometry.
+    /// Computes one unit in the planned drive and in the drive with the task's odometry.
     fn unit(
         &self,
         [planned, drive]: [&Traverse; 2],
@@ -296,14 +300,14 @@ impl Conduct<'_> {
         for (k, &step) in missing.iter().enumerate() {
             let n = missing.len();
             let share = self.share(k as f64 / n as f64);
-            (self.tell)(Progress::Rendering { world: world.to_owned(), k, n, share });
+            (self.notify)(Progress::Rendering { world: world.to_owned(), k, n, share });
             traverse.render_step(step, self.cancel)?;
         }
         self.rendered.fetch_add(1, Ordering::Relaxed);
         Ok(())
     }
 
-    /// Share of the work that is done, from 0 to 1, with `of_world` of a further world rendered.
+    /// Finished fraction of the work, 0 to 1, if `of_world` of another world is rendered.
     fn share(&self, of_world: f64) -> f64 {
         let worlds = self.worlds() * self.order.plan.scenarios().len();
         let rendered = self.rendered.load(Ordering::Relaxed) as f64 + of_world;
@@ -311,16 +315,16 @@ impl Conduct<'_> {
         (RENDERING * rendered / worlds.max(1) as f64 + (1.0 - RENDERING) * tracked).min(1.0)
     }
 
-    /// Tells that these units are done.
+    /// Reports these units as finished.
     fn count(&self, units: &[Unit]) {
         if units.is_empty() {
             return;
         }
         let k = self.done.fetch_add(units.len(), Ordering::Relaxed) + units.len();
-        (self.tell)(Progress::Rows(
+        (self.notify)(Progress::Rows(
             units.iter().flat_map(|unit| rows(self.order.plan.study, unit)).collect(),
         ));
-        (self.tell)(Progress::Units { k, n: self.all(), share: self.share(0.0) });
+        (self.notify)(Progress::Units { k, n: self.all(), share: self.share(0.0) });
     }
 
     /// Number of worlds of each scenario.

@@ -1,7 +1,7 @@
-//! Which figures a study has, and the sentence under each that says what it shows.
+//! The figures of a study, each with a caption.
 //!
-//! A *series* is one configuration at one value of all variables but the first. Its points pool the runs of all worlds; the
-//! bars reach from the least to the greatest value of a single world. Values of the paper stand beside them as squares.
+//! A *series* is one configuration at one value of all variables except the first. Its points pool the runs of all worlds;
+//! error bars show the minimum and maximum over single worlds. Squares show the paper's values.
 
 use std::collections::BTreeMap;
 
@@ -17,19 +17,19 @@ use super::chart::{Chart, Line, merged};
 /// A figure of a report.
 #[derive(Clone, Debug)]
 pub(crate) struct Figure {
-    /// Its name, of which that of its file is made.
+    /// Name, also of the file.
     pub name: &'static str,
-    /// The picture.
+    /// The figure as SVG.
     pub svg: String,
-    /// What it shows, as a sentence.
+    /// Caption, one sentence.
     pub sentence: String,
 }
 
 /// One configuration over the study's first variable.
 pub(crate) struct Series {
-    /// The configuration, and the values of the other variables.
+    /// Configuration and values of the other variables.
     pub label: String,
-    /// The configuration's name.
+    /// Name of the configuration.
     pub configuration: String,
     /// The points, in the order of the grid.
     pub points: Vec<SeriesPoint>,
@@ -37,23 +37,23 @@ pub(crate) struct Series {
 
 /// A series at one value of the first variable.
 pub(crate) struct SeriesPoint {
-    /// Where it stands on the horizontal axis.
+    /// Position on the horizontal axis.
     pub x: f64,
-    /// The value as words.
+    /// The value of the variable as text.
     pub word: String,
-    /// The columns over all worlds.
+    /// Columns pooled over all worlds.
     pub pooled: BTreeMap<String, Value>,
-    /// The columns of each world, with its seed.
+    /// Columns of each world, with its seed.
     pub worlds: Vec<(u64, BTreeMap<String, Value>)>,
 }
 
 impl SeriesPoint {
-    /// A column over all worlds.
+    /// A column pooled over all worlds.
     pub(crate) fn value(&self, column: &str) -> Option<f64> {
         self.pooled.get(column)?.as_f64()
     }
 
-    /// The least and the greatest value of a column in a single world.
+    /// Minimum and maximum of a column over single worlds.
     pub(crate) fn range(&self, column: &str) -> Option<[f64; 2]> {
         let values = self.worlds.iter().filter_map(|(_, columns)| columns.get(column)?.as_f64());
         values.fold(None, |range, v| {
@@ -80,7 +80,7 @@ pub(crate) fn series(plan: &Plan, units: &[Unit]) -> Vec<Series> {
                 .map(|(name, value)| format!(", {name} {}", words_in(value)))
                 .collect();
             let label = format!("{}{}", configuration.name, others.concat());
-            let (x, word) = place(point.variables.first().map(|(_, value)| value), &mut words);
+            let (x, word) = position(point.variables.first().map(|(_, value)| value), &mut words);
             let runs: Vec<&Run> = of_point.iter().flat_map(|unit| &unit.runs).collect();
             let worlds = of_point
                 .iter()
@@ -100,13 +100,13 @@ pub(crate) fn series(plan: &Plan, units: &[Unit]) -> Vec<Series> {
     found
 }
 
-/// A value as a person reads it: words without quotation marks.
+/// A value as text, without quotation marks.
 fn words_in(value: &Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 
-/// Where a value stands on the horizontal axis: a number where it is, a word in the order of the grid.
-fn place(value: Option<&Value>, words: &mut Vec<String>) -> (f64, String) {
+/// The position of a value on the horizontal axis: the number itself, or the index of a word in the order of the grid.
+fn position(value: Option<&Value>, words: &mut Vec<String>) -> (f64, String) {
     if let Some(number) = value.and_then(Value::as_f64) {
         return (number, number.to_string());
     }
@@ -121,7 +121,7 @@ fn place(value: Option<&Value>, words: &mut Vec<String>) -> (f64, String) {
 /// The figures of a study of whole runs.
 ///
 /// # Errors
-/// What the drawing library says.
+/// The message of the drawing library.
 pub(crate) fn figures(plan: &Plan, units: &[Unit]) -> Result<Vec<Figure>, String> {
     let series = series(plan, units);
     let variable = plan.study.variable;
@@ -175,7 +175,7 @@ pub(crate) fn figures(plan: &Plan, units: &[Unit]) -> Result<Vec<Figure>, String
     Ok(drawn)
 }
 
-/// A column over the grid, one line a series.
+/// A column over the grid, one line per series.
 fn over_grid(
     plan: &Plan,
     series: &[Series],
@@ -188,7 +188,7 @@ fn over_grid(
     let mut lines: Vec<Line> = Vec::new();
     let all = series.len() as f64;
     for (colour, series) in series.iter().enumerate() {
-        // Points at the same word stand beside each other.
+        // Points at the same word are drawn side by side.
         let aside = if words.is_empty() { 0.0 } else { 0.6 * ((colour as f64 + 0.5) / all - 0.5) };
         let value = |point: &SeriesPoint| {
             share_or_column(&point.pooled, column).map(|v| (point.x + aside, factor * v))
@@ -227,7 +227,7 @@ fn over_grid(
     Ok(Figure { name, svg: chart.svg()?, sentence })
 }
 
-/// A column, or a share that is made of two.
+/// A column, or the ratio of two columns.
 fn share_or_column(columns: &BTreeMap<String, Value>, column: &str) -> Option<f64> {
     let number = |name: &str| columns.get(name).and_then(Value::as_f64);
     match column {
@@ -252,7 +252,7 @@ pub(super) fn axis(plan: &Plan) -> String {
     format!("{}{unit}", plan.study.variable)
 }
 
-/// The paper's values, each in the colour of the line on which its configuration lies.
+/// The paper's values, each in the colour of the line with its configuration.
 fn paper_lines(paper: &[PaperValue], column: &str, factor: f64, lines: &[Line]) -> Vec<Line> {
     let mut marks: Vec<Line> = Vec::new();
     for value in paper.iter().filter(|value| value.column == column) {
@@ -271,7 +271,7 @@ fn paper_lines(paper: &[PaperValue], column: &str, factor: f64, lines: &[Line]) 
     marks
 }
 
-/// What a column is at both ends of the grid, series by series, with the paper's value where it prints one.
+/// The values of a column at both ends of the grid for each series, with the paper's values if available.
 fn sentence(series: &[Series], column: &str, factor: f64, unit: &str, paper: &[PaperValue]) -> String {
     let unit = unit.rsplit(", ").next().unwrap_or_default();
     let at = |series: &Series, point: &SeriesPoint| {
@@ -284,19 +284,19 @@ fn sentence(series: &[Series], column: &str, factor: f64, unit: &str, paper: &[P
         Some(format!("{value:.digits$} {unit}{printed} at {}", point.word))
     };
     let parts = series.iter().filter_map(|series| {
-        // Of numbers both ends of the grid, of words all.
+        // For numbers, both ends of the grid; for words, all values.
         let last = series.points.len().saturating_sub(1);
-        let is_said = |&(place, point): &(usize, &SeriesPoint)| {
-            place == 0 || place == last || point.word.parse::<f64>().is_err()
+        let is_listed = |&(position, point): &(usize, &SeriesPoint)| {
+            position == 0 || position == last || point.word.parse::<f64>().is_err()
         };
-        let said: Vec<String> = series
+        let sentences: Vec<String> = series
             .points
             .iter()
             .enumerate()
-            .filter(is_said)
+            .filter(is_listed)
             .filter_map(|(_, point)| at(series, point))
             .collect();
-        (!said.is_empty()).then(|| format!("{}: {}", series.label, said.join(", ")))
+        (!sentences.is_empty()).then(|| format!("{}: {}", series.label, sentences.join(", ")))
     });
     let parts: Vec<String> = parts.collect();
     if parts.is_empty() {
@@ -309,7 +309,7 @@ fn sentence(series: &[Series], column: &str, factor: f64, unit: &str, paper: &[P
 /// The distribution of NEES over the tracked runs of each configuration, against χ² with three degrees of freedom.
 fn nees(plan: &Plan, units: &[Unit]) -> Result<Figure, String> {
     let mut lines: Vec<Line> = Vec::new();
-    let mut said: Vec<String> = Vec::new();
+    let mut sentences: Vec<String> = Vec::new();
     for (colour, configuration) in plan.configurations.iter().enumerate() {
         let own: Vec<&Unit> = units.iter().filter(|unit| unit.configuration == configuration.name).collect();
         let runs: Vec<&Run> = own.iter().flat_map(|unit| &unit.runs).collect();
@@ -326,7 +326,7 @@ fn nees(plan: &Plan, units: &[Unit]) -> Result<Figure, String> {
         });
         let pooled = columns(&runs, own.len());
         let number = |name: &str| pooled.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
-        said.push(format!(
+        sentences.push(format!(
             "{}: mean NEES {:.2} (95 % band {:.2} to {:.2} for {} runs), {:.0} % inside 3σ, 3 × RMS of the error of all \
              targets {:.2} cm",
             configuration.name,
@@ -357,7 +357,7 @@ fn nees(plan: &Plan, units: &[Unit]) -> Result<Figure, String> {
     let sentence = format!(
         "A correct covariance follows the thin line. {}. The paper's formula [Kim09 Eq. 5] (3σ, its navcam) gives 1.60 cm with a drift of \
          2.5 px and 2.19 cm with 10 px at 2 m.",
-        said.join("; ")
+        sentences.join("; ")
     );
     Ok(Figure { name: "nees", svg: chart.svg()?, sentence })
 }

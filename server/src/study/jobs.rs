@@ -1,7 +1,7 @@
-//! The studies that were started over REST: one is carried out at a time, the others wait.
+//! The studies started over REST: one is executed at a time, the others wait.
 //!
-//! The list is kept with the sessions; what a study found lives in its folder, too, from which the same study, started
-//! again, goes on. One that the end of the server stopped is found as cancelled.
+//! The list is stored with the sessions. The results are also in the study's folder, from which the same study continues
+//! when started again. A study interrupted by shutdown is marked as cancelled.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -16,111 +16,111 @@ use tokio::sync::broadcast;
 
 use super::execute::{Progress, carry_out};
 use super::order::Order;
-use super::saved::{Keeper, KeptStudy};
+use super::saved::{StoredStudy, StudyStore};
 use crate::jobs::{Lane, lock};
 use crate::limits::SharedLimits;
 use crate::priority::in_background;
 use crate::problem::{ApiError, ApiResult};
 
 /// The studies of a server.
-pub(crate) struct Shelf {
+pub(crate) struct StudyQueue {
     folder: PathBuf,
     events: broadcast::Sender<Event>,
     jobs: Lane,
-    keeper: Keeper,
-    works: Mutex<Vec<Arc<Work>>>,
+    store: StudyStore,
+    studies: Mutex<Vec<Arc<QueuedStudy>>>,
     limits: SharedLimits,
 }
 
-/// A study that was started.
-pub(crate) struct Work {
+/// A started study.
+pub(crate) struct QueuedStudy {
     number: u64,
     new: NewStudy,
     order: Order,
-    keeper: Keeper,
+    store: StudyStore,
     events: broadcast::Sender<Event>,
-    inside: Mutex<Inside>,
+    execution: Mutex<Execution>,
 }
 
-struct Inside {
+struct Execution {
     view: StudyJob,
     rows: Vec<Row>,
     report: Option<String>,
     cancel: Arc<AtomicBool>,
-    /// When it began or was resumed; `None` while it waits.
+    /// When it was started or resumed; `None` while it waits.
     began: Option<Instant>,
 }
 
-impl Shelf {
-    /// A shelf whose studies work in `folder`; its list is read back by [`Shelf::read_back`].
+impl StudyQueue {
+    /// An empty list of studies with results in `folder`; [`StudyQueue::load`] loads the stored list.
     pub(crate) fn new(
         folder: PathBuf,
         events: broadcast::Sender<Event>,
-        keeper: Keeper,
+        store: StudyStore,
         limits: &SharedLimits,
     ) -> Self {
         let jobs = Lane::new(1, limits.studies_waiting.count());
-        Self { folder, events, jobs, keeper, works: Mutex::default(), limits: Arc::clone(limits) }
+        Self { folder, events, jobs, store, studies: Mutex::default(), limits: Arc::clone(limits) }
     }
 
-    /// Puts the studies on the shelf that were kept; `order` says what is to be done for one, and where it cannot, because
-    /// the catalogue is another by now, the study is left out.
+    /// Loads the stored studies. `order` creates the order of a study; if it fails, because the catalogue has changed, the
+    /// study is omitted.
     ///
     /// # Errors
-    /// When the list cannot be read.
-    pub(crate) fn read_back(
+    /// If the list cannot be read.
+    pub(crate) fn load(
         &self,
         order: impl Fn(&NewStudy) -> ApiResult<Order>,
     ) -> sightline_geometry::error::Result<()> {
-        let mut works = lock(&self.works);
-        for (number, kept) in self.keeper.all()? {
-            let rows = kept.read_rows();
-            let KeptStudy { new, job: view, report, .. } = kept.after_a_restart();
+        let mut studies = lock(&self.studies);
+        for (number, stored) in self.store.all()? {
+            let rows = stored.rows_from_json();
+            let StoredStudy { new, job: view, report, .. } = stored.after_a_restart();
             let Ok(order) = order(&new) else { continue };
-            let inside = Mutex::new(Inside { view, rows, report, cancel: Arc::default(), began: None });
-            let (events, keeper) = (self.events.clone(), self.keeper.clone());
-            works.push(Arc::new(Work { number, new, order, keeper, events, inside }));
+            let execution = Mutex::new(Execution { view, rows, report, cancel: Arc::default(), began: None });
+            let (events, store) = (self.events.clone(), self.store.clone());
+            studies.push(Arc::new(QueuedStudy { number, new, order, store, events, execution }));
         }
         Ok(())
     }
 
-    /// The folder of all studies.
+    /// The folder with all studies.
     pub(crate) fn folder(&self) -> &PathBuf {
         &self.folder
     }
 
-    /// The studies, in the order in which they were started.
+    /// The studies, oldest first.
     pub(crate) fn all(&self) -> Vec<StudyJob> {
-        lock(&self.works).iter().map(|work| work.view()).collect()
+        lock(&self.studies).iter().map(|study| study.view()).collect()
     }
 
-    /// The study of that name in paths.
+    /// The study with that path name.
     ///
     /// # Errors
-    /// A problem when there is none.
-    pub(crate) fn work(&self, id: &str) -> ApiResult<Arc<Work>> {
-        let found = lock(&self.works).iter().find(|work| work.view().id == id).cloned();
+    /// A problem if it does not exist.
+    pub(crate) fn study(&self, id: &str) -> ApiResult<Arc<QueuedStudy>> {
+        let found = lock(&self.studies).iter().find(|study| study.view().id == id).cloned();
         found.ok_or_else(|| ApiError::not_found("There is no such study."))
     }
 
-    /// Adds a study, which begins when those before it are done.
+    /// Adds a study, which starts when the earlier ones are done.
     ///
     /// # Errors
-    /// A problem when there are too many already.
+    /// A problem if there are too many.
     pub(crate) fn add(&self, new: NewStudy, order: Order) -> ApiResult<StudyJob> {
-        let work = {
-            let mut works = lock(&self.works);
+        let study = {
+            let mut studies = lock(&self.studies);
             let limit = &self.limits.studies;
-            let surplus = if works.len() >= limit.count() {
-                let ended = works.iter().position(|work| work.has_ended());
+            let surplus = if studies.len() >= limit.count() {
+                let ended = studies.iter().position(|study| study.has_ended());
                 Some(ended.ok_or_else(|| {
-                    ApiError::conflict(format!("{} studies are under way already.", works.len()))
+                    ApiError::conflict(format!("{} studies are under way already.", studies.len()))
                         .hint(limit.hint("Wait until some of them are done, or cancel one."))
                 })?)
             } else {
                 None
             };
-            let number = works.iter().map(|work| work.number).max().unwrap_or(0) + 1;
+            let number = studies.iter().map(|study| study.number).max().unwrap_or(0) + 1;
             let view = StudyJob {
                 id: format!("study-{number}"),
                 study: order.plan.study.name.to_owned(),
@@ -134,179 +134,181 @@ impl Shelf {
                 notices: Vec::new(),
                 command: order.command.clone(),
             };
-            let inside = Inside { view, rows: Vec::new(), report: None, cancel: Arc::default(), began: None };
-            let (events, keeper) = (self.events.clone(), self.keeper.clone());
-            let work = Arc::new(Work { number, new, order, keeper, events, inside: Mutex::new(inside) });
-            self.keeper.keep_new(number, &work.kept(&lock(&work.inside)))?;
+            let execution =
+                Execution { view, rows: Vec::new(), report: None, cancel: Arc::default(), began: None };
+            let (events, store) = (self.events.clone(), self.store.clone());
+            let study =
+                Arc::new(QueuedStudy { number, new, order, store, events, execution: Mutex::new(execution) });
+            self.store.save_new(number, &study.stored(&lock(&study.execution)))?;
             if let Some(surplus) = surplus {
-                self.keeper.forget(works.remove(surplus).number);
+                self.store.forget(studies.remove(surplus).number);
             }
-            works.push(Arc::clone(&work));
-            work
+            studies.push(Arc::clone(&study));
+            study
         };
-        if let Err(problem) = self.submit(&work) {
-            lock(&self.works).retain(|other| other.number != work.number);
-            self.keeper.forget(work.number);
+        if let Err(problem) = self.submit(&study) {
+            lock(&self.studies).retain(|other| other.number != study.number);
+            self.store.forget(study.number);
             return Err(problem);
         }
-        Ok(work.view())
+        Ok(study.view())
     }
 
-    /// Lets a study go on that was cancelled or failed.
+    /// Resumes a cancelled or failed study.
     ///
     /// # Errors
-    /// A problem when it is neither.
+    /// A problem in any other state.
     pub(crate) fn resume(&self, id: &str) -> ApiResult<StudyJob> {
-        let work = self.work(id)?;
-        let may = work.change(|inside| {
-            let may = matches!(inside.view.state, StudyState::Cancelled | StudyState::Failed);
+        let study = self.study(id)?;
+        let may = study.change(|execution| {
+            let may = matches!(execution.view.state, StudyState::Cancelled | StudyState::Failed);
             if may {
-                (inside.cancel, inside.rows) = (Arc::default(), Vec::new());
-                (inside.view.state, inside.view.k) = (StudyState::Waiting, 0);
-                (inside.view.share, inside.view.seconds, inside.began) = (0.0, 0.0, None);
-                "waiting".clone_into(&mut inside.view.doing);
+                (execution.cancel, execution.rows) = (Arc::default(), Vec::new());
+                (execution.view.state, execution.view.k) = (StudyState::Waiting, 0);
+                (execution.view.share, execution.view.seconds, execution.began) = (0.0, 0.0, None);
+                "waiting".clone_into(&mut execution.view.doing);
             }
             may
         });
         if !may {
             return Err(ApiError::conflict("The study was not stopped."));
         }
-        self.submit(&work)?;
-        Ok(work.view())
+        self.submit(&study)?;
+        Ok(study.view())
     }
 
-    /// Stops a study; what it found is kept.
+    /// Stops a study; its results are kept.
     ///
     /// # Errors
-    /// A problem when it has ended already.
+    /// A problem if it has already ended.
     pub(crate) fn cancel(&self, id: &str) -> ApiResult<StudyJob> {
-        let work = self.work(id)?;
-        let was_going = work.change(|inside| {
-            inside.cancel.store(true, Ordering::Relaxed);
-            matches!(inside.view.state, StudyState::Waiting | StudyState::Running)
+        let study = self.study(id)?;
+        let was_going = study.change(|execution| {
+            execution.cancel.store(true, Ordering::Relaxed);
+            matches!(execution.view.state, StudyState::Waiting | StudyState::Running)
         });
-        if was_going { Ok(work.view()) } else { Err(ApiError::conflict("The study has ended already.")) }
+        if was_going { Ok(study.view()) } else { Err(ApiError::conflict("The study has ended already.")) }
     }
 
     /// Stops all studies.
     pub(crate) fn close(&self) {
-        for work in lock(&self.works).iter() {
-            lock(&work.inside).cancel.store(true, Ordering::Relaxed);
+        for study in lock(&self.studies).iter() {
+            lock(&study.execution).cancel.store(true, Ordering::Relaxed);
         }
     }
 
-    fn submit(&self, work: &Arc<Work>) -> ApiResult<()> {
-        let work = Arc::clone(work);
-        self.jobs.submit(move || in_background(|| work.carry_out()))
+    fn submit(&self, study: &Arc<QueuedStudy>) -> ApiResult<()> {
+        let study = Arc::clone(study);
+        self.jobs.submit(move || in_background(|| study.carry_out()))
     }
 }
 
-impl Work {
-    /// How it stands.
+impl QueuedStudy {
+    /// The current state.
     pub(crate) fn view(&self) -> StudyJob {
-        lock(&self.inside).view.clone()
+        lock(&self.execution).view.clone()
     }
 
     /// The rows so far.
     pub(crate) fn rows(&self) -> Vec<Row> {
-        lock(&self.inside).rows.clone()
+        lock(&self.execution).rows.clone()
     }
 
-    /// The report, once it is done.
+    /// The report; `None` until the study is done.
     pub(crate) fn report(&self) -> Option<String> {
-        lock(&self.inside).report.clone()
+        lock(&self.execution).report.clone()
     }
 
     fn has_ended(&self) -> bool {
         !matches!(self.view().state, StudyState::Waiting | StudyState::Running)
     }
 
-    /// Writes how it stands.
-    fn keep(&self, inside: &Inside) {
-        self.keeper.keep(self.number, &self.kept(inside));
+    /// Stores the state.
+    fn save(&self, execution: &Execution) {
+        self.store.save_or_defer(self.number, &self.stored(execution));
     }
 
-    /// As it is kept.
-    fn kept(&self, inside: &Inside) -> KeptStudy {
-        let (job, report) = (inside.view.clone(), inside.report.clone());
-        // Rows before the end are found again in the study's folder.
-        let rows = if report.is_some() { KeptStudy::kept_rows(&inside.rows) } else { Vec::new() };
-        KeptStudy { new: self.new.clone(), job, rows, report }
+    /// The stored form of the study.
+    fn stored(&self, execution: &Execution) -> StoredStudy {
+        let (job, report) = (execution.view.clone(), execution.report.clone());
+        // Rows of an unfinished study are read from the study's folder again.
+        let rows = if report.is_some() { StoredStudy::rows_to_json(&execution.rows) } else { Vec::new() };
+        StoredStudy { new: self.new.clone(), job, rows, report }
     }
 
-    /// Changes it and sends the change to every page, in the order of the changes.
-    fn change<T>(&self, change: impl FnOnce(&mut Inside) -> T) -> T {
-        let mut inside = lock(&self.inside);
-        let result = change(&mut inside);
-        inside.stamp();
-        self.tell(&inside);
+    /// Changes the state and sends it to every page, in the order of the changes.
+    fn change<T>(&self, change: impl FnOnce(&mut Execution) -> T) -> T {
+        let mut execution = lock(&self.execution);
+        let result = change(&mut execution);
+        execution.stamp();
+        self.send_progress(&execution);
         result
     }
 
-    fn tell(&self, inside: &Inside) {
-        // Nobody may be listening.
-        let _ = self.events.send(Event::StudyProgress { job: inside.view.clone() });
+    fn send_progress(&self, execution: &Execution) {
+        // An error only means that there are no subscribers.
+        let _ = self.events.send(Event::StudyProgress { job: execution.view.clone() });
     }
 
     fn carry_out(&self) {
-        let cancel = Arc::clone(&lock(&self.inside).cancel);
+        let cancel = Arc::clone(&lock(&self.execution).cancel);
         if cancel.load(Ordering::Relaxed) {
-            self.finish(|inside| end(inside, StudyState::Cancelled, ""));
+            self.finish(|execution| end(execution, StudyState::Cancelled, ""));
             return;
         }
-        self.change(|inside| {
-            (inside.view.state, inside.began) = (StudyState::Running, Some(Instant::now()));
+        self.change(|execution| {
+            (execution.view.state, execution.began) = (StudyState::Running, Some(Instant::now()));
         });
-        self.keep(&lock(&self.inside));
-        let work = std::panic::AssertUnwindSafe(|| {
-            carry_out(self.order.clone(), &cancel, &|progress| self.hear(progress))
+        self.save(&lock(&self.execution));
+        let run = std::panic::AssertUnwindSafe(|| {
+            carry_out(self.order.clone(), &cancel, &|progress| self.on_progress(progress))
         });
-        match std::panic::catch_unwind(work) {
-            Ok(Ok(outcome)) => self.finish(|inside| {
-                (inside.rows, inside.report) = (outcome.rows, Some(outcome.report));
-                inside.view.share = 1.0;
-                // The state says it already.
-                end(inside, StudyState::Done, "");
+        match std::panic::catch_unwind(run) {
+            Ok(Ok(outcome)) => self.finish(|execution| {
+                (execution.rows, execution.report) = (outcome.rows, Some(outcome.report));
+                execution.view.share = 1.0;
+                // The state is sufficient.
+                end(execution, StudyState::Done, "");
             }),
             Ok(Err(Error::Cancelled)) => {
-                self.finish(|inside| end(inside, StudyState::Cancelled, ""));
+                self.finish(|execution| end(execution, StudyState::Cancelled, ""));
             }
-            Ok(Err(error)) => self.finish(|inside| end(inside, StudyState::Failed, &error.to_string())),
+            Ok(Err(error)) => self.finish(|execution| end(execution, StudyState::Failed, &error.to_string())),
             Err(_) => {
                 let why = "the server met a fault of its own; its log says more";
-                self.finish(|inside| end(inside, StudyState::Failed, why));
+                self.finish(|execution| end(execution, StudyState::Failed, why));
             }
         }
     }
 
-    /// Ends it: on disk before anybody sees it, so that what a person saw outlives the server.
-    fn finish(&self, end: impl FnOnce(&mut Inside)) {
-        let mut inside = lock(&self.inside);
-        end(&mut inside);
-        inside.stamp();
-        inside.began = None;
-        self.keep(&inside);
-        self.tell(&inside);
+    /// Ends the study. The state is on disk before clients see it, so that it survives a restart.
+    fn finish(&self, end: impl FnOnce(&mut Execution)) {
+        let mut execution = lock(&self.execution);
+        end(&mut execution);
+        execution.stamp();
+        execution.began = None;
+        self.save(&execution);
+        self.send_progress(&execution);
     }
 
-    fn hear(&self, progress: Progress) {
+    fn on_progress(&self, progress: Progress) {
         match progress {
-            Progress::Rows(rows) => lock(&self.inside).rows.extend(rows),
-            Progress::Units { k, n, share } => self.change(|inside| {
-                (inside.view.k, inside.view.n, inside.view.share) = (k, n, share);
-                "tracking".clone_into(&mut inside.view.doing);
+            Progress::Rows(rows) => lock(&self.execution).rows.extend(rows),
+            Progress::Units { k, n, share } => self.change(|execution| {
+                (execution.view.k, execution.view.n, execution.view.share) = (k, n, share);
+                "tracking".clone_into(&mut execution.view.doing);
             }),
-            Progress::Rendering { world, k, n, share } => self.change(|inside| {
-                inside.view.share = share;
-                inside.view.doing = format!("rendering stop {} of {n} of {world}", k + 1);
+            Progress::Rendering { world, k, n, share } => self.change(|execution| {
+                execution.view.share = share;
+                execution.view.doing = format!("rendering stop {} of {n} of {world}", k + 1);
             }),
-            Progress::Notice(text) => self.change(|inside| inside.view.notices.push(text)),
+            Progress::Notice(text) => self.change(|execution| execution.view.notices.push(text)),
         }
     }
 }
 
-impl Inside {
-    /// Gives the state its number and how long the study took.
+impl Execution {
+    /// Updates the revision and duration of the state.
     fn stamp(&mut self) {
         if let Some(began) = self.began {
             self.view.seconds = began.elapsed().as_secs_f64();
@@ -315,7 +317,7 @@ impl Inside {
     }
 }
 
-fn end(inside: &mut Inside, state: StudyState, doing: &str) {
-    inside.view.state = state;
-    doing.clone_into(&mut inside.view.doing);
+fn end(execution: &mut Execution, state: StudyState, doing: &str) {
+    execution.view.state = state;
+    doing.clone_into(&mut execution.view.doing);
 }

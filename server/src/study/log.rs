@@ -1,7 +1,7 @@
-//! The file of results: one line of JSON for each unit, added and synced as soon as the unit is done.
+//! The file of results: one line of JSON per unit, appended and synced as soon as the unit is done.
 //!
-//! A program that was killed leaves at most its last line half written. A line that cannot be read is dropped, with a
-//! sentence, and the file is written anew without it; its unit is then done again.
+//! After a crash, at most the last line is incomplete. Unreadable lines are reported and removed by rewriting the file;
+//! their units are computed again.
 
 use std::collections::HashMap;
 use std::fs::{File, OpenOptions, TryLockError};
@@ -15,25 +15,25 @@ use sightline_study::plan::Unit;
 
 use crate::jobs::lock;
 
-/// The name of the file.
+/// The file name.
 const NAME: &str = "results.jsonl";
 
-/// The results of a study's folder, opened for adding to them.
+/// The results of a study's folder, open for appending.
 pub(crate) struct ResultLog {
     path: PathBuf,
     file: Mutex<File>,
-    kept: HashMap<String, Unit>,
-    /// What was odd about the file, one sentence each.
+    units: HashMap<String, Unit>,
+    /// Problems found in the file, one sentence each.
     pub notices: Vec<String>,
-    /// Held as long as the log is open, so that no two programs write it.
+    /// Prevents other programs from writing while the log is open.
     _lock: File,
 }
 
 impl ResultLog {
-    /// Opens the results in `folder`, which is made where it is missing.
+    /// Opens the results in `folder`, which is created if necessary.
     ///
     /// # Errors
-    /// A folder that cannot be read or written, or that another program writes to.
+    /// A folder that cannot be read or written, or is in use by another program.
     pub(crate) fn open(folder: &Path) -> Result<Self> {
         std::fs::create_dir_all(folder).map_err(|source| Error::Write { path: folder.to_owned(), source })?;
         let lock = lock_folder(folder)?;
@@ -43,7 +43,7 @@ impl ResultLog {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
             Err(source) => return Err(Error::Read { path, source }),
         };
-        let (kept, notices) = read(&path, &text);
+        let (units, notices) = read(&path, &text);
         if !notices.is_empty() || !(text.is_empty() || text.ends_with('\n')) {
             let lines: Vec<String> =
                 text.lines().filter(|line| parse(line).is_some()).map(|l| format!("{l}\n")).collect();
@@ -54,15 +54,15 @@ impl ResultLog {
             .append(true)
             .open(&path)
             .map_err(|source| Error::Write { path: path.clone(), source })?;
-        Ok(Self { path, file: Mutex::new(file), kept, notices, _lock: lock })
+        Ok(Self { path, file: Mutex::new(file), units, notices, _lock: lock })
     }
 
-    /// The unit that is kept under this key.
+    /// The cached unit with this key.
     pub(crate) fn get(&self, key: &str) -> Option<&Unit> {
-        self.kept.get(key)
+        self.units.get(key)
     }
 
-    /// Adds a unit.
+    /// Appends a unit.
     ///
     /// # Errors
     /// A file that cannot be written.
@@ -94,11 +94,11 @@ fn parse(line: &str) -> Option<Unit> {
 }
 
 fn read(path: &Path, text: &str) -> (HashMap<String, Unit>, Vec<String>) {
-    let (mut kept, mut notices) = (HashMap::new(), Vec::new());
+    let (mut units, mut notices) = (HashMap::new(), Vec::new());
     for (number, line) in text.lines().enumerate() {
         match parse(line) {
             Some(unit) => {
-                kept.insert(unit.key.clone(), unit);
+                units.insert(unit.key.clone(), unit);
             }
             None => notices.push(format!(
                 "{}: line {} cannot be read and is dropped; its unit is done again",
@@ -107,7 +107,7 @@ fn read(path: &Path, text: &str) -> (HashMap<String, Unit>, Vec<String>) {
             )),
         }
     }
-    (kept, notices)
+    (units, notices)
 }
 
 #[cfg(test)]
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_added_is_there_again_and_a_half_written_line_is_dropped_and_said() {
+    fn added_units_are_read_back_without_a_torn_line() {
         let folder = tempfile::tempdir().unwrap();
         {
             let log = ResultLog::open(folder.path()).unwrap();
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn two_programs_do_not_write_the_same_results() {
+    fn two_programs_cannot_write_the_same_results() {
         let folder = tempfile::tempdir().unwrap();
         let _first = ResultLog::open(folder.path()).unwrap();
         let refusal = ResultLog::open(folder.path()).map(|_| ()).unwrap_err().to_string();

@@ -1,14 +1,14 @@
-//! Studies carried out: worlds rendered, units tracked and kept as they come, tables and a report at the end. The
-//! command line and the REST resource both come here.
+//! Execution of studies: renders worlds, tracks units and stores each result, then writes tables and a report. Used by the
+//! command line and the REST resource.
 //!
 //! ```text
 //! folder/<scenario>/world-<seed>/   a world, rendered once and shared by all studies of the folder
-//! folder/<study>/results.jsonl      one line a unit, added as it is done: what a stopped study goes on from
-//! folder/<study>/rows.csv, rows.parquet, runs.csv, report.html, *.svg   made anew at the end
+//! folder/<study>/results.jsonl      one line per unit, appended when it is done: a stopped study continues from it
+//! folder/<study>/rows.csv, rows.parquet, runs.csv, report.html, *.svg   rewritten at the end
 //! ```
 //!
-//! A unit is one configuration at one point of the grid in one world. Its line is kept under a key of all that decides
-//! it (`core::study::plan`), so that the same folder serves other grids, seeds and configurations later.
+//! A unit is one configuration at one point of the grid in one world. Its line contains a key of all its inputs
+//! (`core::study::plan`), so that other grids, seeds and configurations can share the folder.
 
 pub(crate) mod order;
 pub(crate) mod execute;

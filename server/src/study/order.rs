@@ -1,4 +1,4 @@
-//! The order of a study: what is to be carried out, in which worlds and where.
+//! The order of a study: plan, worlds and folder.
 
 use std::path::{Path, PathBuf};
 
@@ -9,51 +9,51 @@ use sightline_world::Scenario;
 use crate::naming::hash;
 use crate::problem::{ApiError, ApiResult};
 
-/// The most worlds of a study that is started here.
+/// Maximum number of worlds of a study started over REST.
 const WORLD_LIMIT: u64 = 100;
-/// The largest seed that a browser takes exactly.
+/// The largest seed that JavaScript represents exactly.
 const SEED_LIMIT: u64 = 1 << 53;
 
-/// Which worlds.
+/// The worlds of a study.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Seeds {
-    /// These, with however many targets they offer.
+    /// Explicit seeds, with any number of targets.
     Named(Vec<u64>),
-    /// So many that offer all their targets, from a first seed on.
+    /// The first worlds that have all their targets.
     Count {
-        /// How many.
+        /// Number of worlds.
         worlds: u64,
-        /// The first seed that is tried.
+        /// The first seed to try.
         first: u64,
     },
 }
 
-/// What is to be carried out.
+/// The parameters of a study.
 #[derive(Clone, Debug)]
 pub struct Order {
-    /// The study.
+    /// Study, configurations and grid.
     pub plan: Plan,
     /// The worlds.
     pub seeds: Seeds,
-    /// A scenario in place of the study's own, with its name.
+    /// A scenario that replaces the study's own, with its name.
     pub scenario: Option<(String, Scenario)>,
     /// The folder for worlds and results.
     pub folder: PathBuf,
-    /// The command line that does the same, for the report.
+    /// The command line that reproduces the study, for the report.
     pub command: String,
 }
 
-/// What is to be done for a study that is asked for, with its worlds below `folder`.
+/// The order of a requested study, with its worlds below `folder`.
 ///
 /// # Errors
-/// A problem that names what is wrong with it.
+/// A problem that names the fault in the request.
 pub(crate) fn order(folder: &Path, new: &NewStudy) -> ApiResult<Order> {
     let plan = Plan::new(&new.study, &new.configurations, &new.grid)?;
     let seeds = seeds(new)?;
     let scenario = match &new.scenario {
         Some(scenario) => {
             scenario.validate()?;
-            // Its worlds have a folder of their own.
+            // Its worlds have a separate folder.
             Some((format!("own-{}", &hash(scenario.to_toml().as_bytes())[..12]), scenario.clone()))
         }
         None => None,
@@ -87,7 +87,7 @@ fn seeds(new: &NewStudy) -> ApiResult<Seeds> {
     }
 }
 
-/// The command line that does the same.
+/// The command line that reproduces the study.
 fn command(new: &NewStudy, plan: &Plan, seeds: &Seeds) -> String {
     let worlds = match seeds {
         Seeds::Named(seeds) => {

@@ -1,4 +1,4 @@
-//! The report of a study: one HTML file that needs no other, with its figures inside; the figures also as SVG files.
+//! The report of a study: one self-contained HTML file with its figures, which are also written as SVG files.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -15,7 +15,7 @@ use super::order::Order;
 use super::step_figure::checkout;
 use crate::version::VERSION;
 
-/// The name of the file.
+/// The file name.
 pub(crate) const NAME: &str = "report.html";
 
 const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;max-width:1000px;margin:2rem auto;padding:0 1rem;color:#222;\
@@ -70,7 +70,7 @@ fn html(order: &Order, units: &[Unit], figures: &[Figure]) -> String {
     text
 }
 
-/// Table II with ours beside it, for the study that has odometry.
+/// Table II with our values next to it, for the study with odometry.
 fn table_ii(rows: &[Row]) -> String {
     let table = terrain_table::table(rows);
     if table.is_empty() {
@@ -90,7 +90,7 @@ fn table_ii(rows: &[Row]) -> String {
     )
 }
 
-/// How much was done.
+/// The number of worlds and runs.
 fn extent(units: &[Unit]) -> String {
     let mut worlds: Vec<(&str, u64)> = units.iter().map(|unit| (unit.scenario.as_str(), unit.seed)).collect();
     worlds.sort_unstable();
@@ -105,7 +105,7 @@ fn extent(units: &[Unit]) -> String {
     )
 }
 
-/// A column of the table: name, words, factor, digits.
+/// A column of the table: name, label, factor, decimals.
 type Column = (&'static str, &'static str, f64, usize);
 
 /// The pooled columns of the table.
@@ -126,7 +126,7 @@ const COLUMNS: [Column; 14] = [
     ("uneven_px", "unevenness, px", 1.0, 2),
 ];
 
-/// The columns of faults and of targets that are counted apart, where there are any.
+/// The columns of faults and of separately counted targets, if there are any.
 const MORE: [Column; 13] = [
     ("uneven_true_px", "of the truth, px", 1.0, 2),
     ("boundary_targets", "boundary targets", 1.0, 0),
@@ -145,7 +145,7 @@ const MORE: [Column; 13] = [
 
 fn table(plan: &Plan, series: &[Series]) -> String {
     let points = || series.iter().flat_map(|series| &series.points);
-    // What a fault did comes before what else there is.
+    // For faults, their columns come first.
     let (first, then): (&[Column], &[Column]) = if points().any(|point| point.value("cases").is_some()) {
         (&MORE, &COLUMNS)
     } else {
@@ -190,7 +190,7 @@ fn by_world(point: &SeriesPoint) -> String {
         .map_or_else(String::new, |[low, high]| format!("{:.0}–{:.0}", 100.0 * low, 100.0 * high))
 }
 
-/// Every step of every run of a checkout, with the truth and the paper beside it.
+/// Every step of every run of a checkout, with the ground truth and the paper's values.
 fn step_table(plan: &Plan, units: &[Unit]) -> String {
     let paper = plan.study.paper();
     let mut text = "<h2>Table</h2>\n<div class=\"wide\"><table><tr><th>configuration</th><th>seed</th><th>position</th><th>state</th>\
@@ -242,7 +242,7 @@ fn is_at(value: &sightline_study::paper::PaperValue, column: &str, position: usi
     value.column == column && value.at == position as f64
 }
 
-/// The exact settings, and how to do the same again.
+/// The exact settings, and how to reproduce the study.
 fn settings(order: &Order) -> String {
     let mut text = format!(
         "<h2>Settings</h2>\n<p>sightline {}, tracker {}. Each configuration changes the defaults so:</p>\n<table>",
@@ -283,7 +283,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_comes_from_outside_cannot_become_markup() {
+    fn external_text_is_escaped() {
         assert_eq!(escape("<b a=\"1\">&"), "&lt;b a=&quot;1&quot;&gt;&amp;");
     }
 }

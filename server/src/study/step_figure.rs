@@ -8,7 +8,8 @@ use sightline_study::row::{Row, rows};
 use super::chart::{Chart, Line};
 use super::figure::{Figure, axis};
 
-/// Columns of a checkout over the rover's positions: each configuration, the truth of the staged drive, the paper.
+/// Columns of a checkout over the rover's positions: each configuration, the ground truth of the staged drive, and the
+/// paper.
 pub(super) fn checkout(plan: &Plan, units: &[Unit]) -> Result<Vec<Figure>, String> {
     let columns: &[(&'static str, &str, &str)] = match plan.study.name {
         "checkout-1" => &[
@@ -38,14 +39,14 @@ fn step_figure(
     words: &str,
 ) -> Result<Figure, String> {
     let mut lines: Vec<Line> = Vec::new();
-    let mut said: Vec<String> = Vec::new();
+    let mut sentences: Vec<String> = Vec::new();
     for (colour, configuration) in plan.configurations.iter().enumerate() {
         let own = units.iter().filter(|unit| unit.configuration == configuration.name);
         let rows: Vec<_> = own.flat_map(|unit| rows(plan.study, unit)).collect();
         let (points, ranges) = over_positions(&rows, column);
         let [low, high] =
             points.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], p| [l.min(p.1), h.max(p.1)]);
-        said.push(format!("{}: {low:.2} to {high:.2}", configuration.name));
+        sentences.push(format!("{}: {low:.2} to {high:.2}", configuration.name));
         lines.push(Line { label: configuration.name.clone(), colour, points, ranges, ..Line::default() });
         if colour == 0 && !truth.is_empty() {
             let (points, _) = over_positions(&rows, truth);
@@ -76,14 +77,15 @@ fn step_figure(
     }
     let chart =
         Chart { title: words.to_owned(), axes: [axis(plan), words.to_owned()], lines, ..Chart::default() };
-    let sentence = format!("Means over the worlds, {words}: {}.", said.join("; "));
+    let sentence = format!("Means over the worlds, {words}: {}.", sentences.join("; "));
     Ok(Figure { name: column, svg: chart.svg()?, sentence })
 }
 
-/// Points of a line, and for each the least and greatest value of a single world.
+/// Points of a line, and for each the minimum and maximum over single worlds.
 type PointsAndRanges = (Vec<(f64, f64)>, Vec<(f64, [f64; 2])>);
 
-/// The mean of a column over the worlds at each position, and its range; of rolls their sizes, as Table III prints them.
+/// The mean of a column over the worlds at each position, with its range; for rolls, the mean absolute value, as printed in
+/// Table III.
 fn over_positions(rows: &[Row], column: &str) -> PointsAndRanges {
     let mut at: BTreeMap<u64, Vec<f64>> = BTreeMap::new();
     for row in rows {

@@ -1,7 +1,7 @@
 //! The tables of a study: its rows as CSV and Parquet, its runs as CSV.
 //!
-//! Columns: study, configuration, scenario and seed, then the study's variables, then everything else by name. What a row
-//! does not have is empty. In Parquet whole numbers are INT64, other numbers DOUBLE, words UTF8; all may be null.
+//! Columns: study, configuration, scenario and seed, then the study's variables, then all others by name. Missing values are
+//! empty. In Parquet, integers are INT64, other numbers DOUBLE, texts UTF8; all are nullable.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -38,15 +38,15 @@ pub(crate) fn rows_csv(rows: &[Row]) -> String {
     Table::of(rows).csv()
 }
 
-/// Named columns of as many values as there are rows.
+/// Named columns with one value per row.
 struct Table {
     columns: Vec<(String, Vec<Value>)>,
     rows: usize,
 }
 
-/// The kinds of columns.
+/// Column types.
 #[derive(Clone, Copy, PartialEq)]
-enum Kind {
+enum ColumnType {
     Whole,
     Number,
     Word,
@@ -65,7 +65,7 @@ impl Table {
             ("seed".to_owned(), rows.iter().map(|row| row.seed.into()).collect()),
         ];
         let value = |row: &Row, name: &str| row.columns.get(name).cloned().unwrap_or(Value::Null);
-        // A study without a variable of its own names its scenario once.
+        // A study without a variable has the scenario only once.
         let own = names.into_iter().filter(|name| *name != "scenario");
         columns.extend(own.map(|name| (name.clone(), rows.iter().map(|row| value(row, name)).collect())));
         Self { columns, rows: rows.len() }
@@ -85,12 +85,12 @@ impl Table {
     fn parquet(&self) -> Result<Vec<u8>, ParquetError> {
         let mut schema = "message rows {".to_owned();
         for (name, values) in &self.columns {
-            let kind = match kind(values) {
-                Kind::Whole => format!("optional int64 {name};"),
-                Kind::Number => format!("optional double {name};"),
-                Kind::Word => format!("optional byte_array {name} (utf8);"),
+            let column_type = match column_type(values) {
+                ColumnType::Whole => format!("optional int64 {name};"),
+                ColumnType::Number => format!("optional double {name};"),
+                ColumnType::Word => format!("optional byte_array {name} (utf8);"),
             };
-            schema.push_str(&kind);
+            schema.push_str(&column_type);
         }
         schema.push('}');
         let properties = WriterProperties::builder().set_compression(Compression::UNCOMPRESSED).build();
@@ -107,30 +107,30 @@ impl Table {
     }
 }
 
-fn kind(values: &[Value]) -> Kind {
+fn column_type(values: &[Value]) -> ColumnType {
     let known = || values.iter().filter(|value| !value.is_null());
     if known().all(Value::is_i64) && known().next().is_some() {
-        Kind::Whole
+        ColumnType::Whole
     } else if known().all(Value::is_number) {
-        Kind::Number
+        ColumnType::Number
     } else {
-        Kind::Word
+        ColumnType::Word
     }
 }
 
 fn write_column(mut column: SerializedColumnWriter<'_>, values: &[Value]) -> Result<(), ParquetError> {
     let levels: Vec<i16> = values.iter().map(|value| i16::from(!value.is_null())).collect();
     let known = || values.iter().filter(|value| !value.is_null());
-    match kind(values) {
-        Kind::Whole => {
+    match column_type(values) {
+        ColumnType::Whole => {
             let values: Vec<i64> = known().filter_map(Value::as_i64).collect();
             column.typed::<Int64Type>().write_batch(&values, Some(&levels), None)?;
         }
-        Kind::Number => {
+        ColumnType::Number => {
             let values: Vec<f64> = known().filter_map(Value::as_f64).collect();
             column.typed::<DoubleType>().write_batch(&values, Some(&levels), None)?;
         }
-        Kind::Word => {
+        ColumnType::Word => {
             let values: Vec<ByteArray> =
                 known().map(|value| ByteArray::from(word(value).into_bytes())).collect();
             column.typed::<ByteArrayType>().write_batch(&values, Some(&levels), None)?;
@@ -148,7 +148,7 @@ fn cell(value: &Value) -> String {
     if value.is_null() { String::new() } else { table::cell(&word(value)) }
 }
 
-/// One line a target.
+/// One line per target.
 fn runs_csv(units: &[Unit]) -> String {
     let mut text = "configuration,scenario,seed,point,target,group,x_px,y_px,refused,start_distance_m,end_distance_m,\
                     steps,steps_tracked,steps_lost,run_tracked,state,false_tracked_steps,false_lost_steps,err_px,err_m,\
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn the_parquet_file_holds_what_the_rows_hold() {
+    fn the_parquet_file_contains_the_rows() {
         let bytes = Table::of(&rows()).parquet().unwrap();
         let reader = SerializedFileReader::new(parquet_bytes(bytes)).unwrap();
         let names: Vec<String> = reader

@@ -1,4 +1,4 @@
-//! The access token: on every route, and in nothing that leaves the server.
+//! The access token: required on every route, and absent from every output of the server.
 
 use std::process::{Command, Stdio};
 
@@ -11,7 +11,7 @@ use sightline_tests::server::{PORT, TOKEN, TestServer, small_drive};
 
 use crate::cli::program;
 
-/// The path of a route with names of nothing.
+/// The path of a route, with names that do not exist.
 fn filled(path: &str) -> String {
     let parts = path.split('/').map(|part| match part {
         "{session}" => "s99",
@@ -94,7 +94,7 @@ async fn a_login_gives_a_cookie_that_opens() {
     assert_eq!(server.send(image.body(Body::empty()).unwrap()).await.status, 200);
 }
 
-/// Everything that the program writes with the most detailed log, while the token is used in each way.
+/// Covers the complete output of the program at the most detailed log level, while the token is used in every way.
 #[test]
 fn the_token_is_in_no_line_of_the_log_and_in_no_export() {
     let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
@@ -142,7 +142,7 @@ fn the_token_is_in_no_line_of_the_log_and_in_no_export() {
     assert!(!log.contains(TOKEN), "{}", log.lines().find(|line| line.contains(TOKEN)).unwrap());
 }
 
-/// The address that the program prints, and its warnings.
+/// The address and the warnings that the program prints.
 fn printed(arguments: &[&str]) -> (String, String) {
     let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
     let mut child = Command::new(program())

@@ -1,7 +1,6 @@
-//! Attacks over HTTP, as a table: the bytes that are sent to a listening server, and the answer that they must get.
+//! Attacks over HTTP, as a table: the bytes sent to a listening server, and the response that is required.
 //!
-//! Every answer, whichever attack it is for, must also have the headers that keep other sites away, and must not contain the
-//! access token.
+//! Every response to an attack must also have the headers that exclude other sites, and must not contain the access token.
 
 mod access;
 mod proxied;
@@ -24,19 +23,19 @@ use tokio::net::TcpStream;
 use single::SINGLE;
 use table::{CREDENTIALS, Entry, FOREIGN_HOSTS, FOREIGN_ORIGINS, KINDS, OURS};
 
-/// How long an answer may take; less than the server waits for a body.
+/// Maximum time for a response; shorter than the server waits for a body.
 const PATIENCE: Duration = Duration::from_secs(25);
 
-/// A server that listens, with the session `s1` that has a target and is streamed to Rerun.
-pub(super) struct Listening {
+/// A listening server with the session `s1`, which has a target and is streamed to Rerun.
+pub(super) struct RunningServer {
     pub address: SocketAddr,
     pub state: AppState,
     pub traverse: String,
     _folders: [TempDir; 2],
 }
 
-impl Listening {
-    /// Serves at a free port; `access` makes the rules from the port.
+impl RunningServer {
+    /// Serves on a free port; `access` returns the access rules for that port.
     pub(crate) async fn start(access: impl FnOnce(u16) -> Access) -> Self {
         let folders = [small_drive(), tempfile::tempdir().unwrap()];
         let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
@@ -49,13 +48,13 @@ impl Listening {
         Self { address, state, traverse, _folders: folders }
     }
 
-    /// The answer to a request as our own page sends it; `path` is below `/api/v1/`.
-    pub(crate) async fn ask(&self, method: &str, path: &str, body: &str) -> Answer {
+    /// Returns the response to a request as our own page sends it; `path` is below `/api/v1/`.
+    pub(crate) async fn request(&self, method: &str, path: &str, body: &str) -> Answer {
         let headers = ["Host: $HOST", "Authorization: Bearer $TOKEN", "Content-Type: application/json"];
         self.send(&format!("{method} /api/v1/{path} HTTP/1.1"), &headers, body).await
     }
 
-    /// Sends a request that is written down with `$HOST`, `$PORT`, `$TOKEN` and `$DRIVE`, and reads the head of the answer and
+    /// Sends a request in which `$HOST`, `$PORT`, `$TOKEN` and `$DRIVE` are replaced, and reads the head of the response and
     /// the beginning of its body.
     pub(crate) async fn send(&self, line: &str, headers: &[&str], body: &str) -> Answer {
         let address = self.address.to_string();
@@ -82,23 +81,23 @@ impl Listening {
 
     async fn with_session(self) -> Self {
         let traverse = format!(r#"{{"traverse":"{}"}}"#, self.traverse);
-        assert_eq!(self.ask("POST", "sessions", &traverse).await.status, 201);
+        assert_eq!(self.request("POST", "sessions", &traverse).await.status, 201);
         let [x, y] = PIXEL;
         let target = format!(r#"{{"step":0,"pixel":{{"x":{x},"y":{y}}}}}"#);
-        assert_eq!(self.ask("POST", "sessions/s1/targets", &target).await.status, 201);
-        assert_eq!(self.ask("POST", "sessions/s1/rerun", "{}").await.status, 200);
+        assert_eq!(self.request("POST", "sessions/s1/targets", &target).await.status, 201);
+        assert_eq!(self.request("POST", "sessions/s1/rerun", "{}").await.status, 200);
         self
     }
 }
 
-/// The answer to a request that is sent as it is.
+/// Returns the response to a request that is sent unchanged.
 pub(super) async fn exchange(address: SocketAddr, text: &str) -> Answer {
     let mut stream = TcpStream::connect(address).await.unwrap();
     stream.write_all(text.as_bytes()).await.unwrap();
     Answer::read(&mut stream).await
 }
 
-/// The head of an answer and the beginning of its body; the status is 0 where the server closed the connection.
+/// The head of a response and the beginning of its body; the status is 0 if the server closed the connection.
 #[derive(Debug)]
 pub(super) struct Answer {
     pub status: u16,
@@ -115,7 +114,7 @@ impl Answer {
             let length = head.to_ascii_lowercase();
             let length =
                 length.split("content-length: ").nth(1).and_then(|rest| rest.lines().next()?.parse().ok());
-            // Problems are short; of a file the beginning is enough.
+            // Problems are short; of a file the beginning suffices.
             length.is_none_or(|length: usize| body.len() >= length.min(4096))
         };
         let mut part = [0; 8192];
@@ -139,7 +138,7 @@ impl Answer {
         self.headers.get(name).map_or("", String::as_str)
     }
 
-    /// What is wrong with it beside its status; answers of the parser of HTTP itself are bare.
+    /// The faults of the response apart from its status; responses of the HTTP parser itself lack the security headers.
     fn faults(&self) -> Vec<String> {
         let mut faults = Vec::new();
         if self.body.contains(TOKEN) || self.headers.values().any(|value| value.contains(TOKEN)) {
@@ -169,7 +168,7 @@ impl Answer {
     }
 }
 
-/// All entries: those of each kind of route with each foreign host, foreign origin and wrong credential, and the single ones.
+/// All entries: each kind of route with each foreign host, foreign origin and wrong credential, and the single ones.
 fn entries() -> Vec<Entry> {
     let mut all: Vec<Entry> = SINGLE.iter().map(Entry::single).collect();
     for kind in KINDS {
@@ -194,8 +193,8 @@ fn entries() -> Vec<Entry> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn every_attack_of_the_table_is_answered_as_it_says() {
-    let server = Listening::start(sightline_tests::server::access).await.with_session().await;
+async fn every_attack_has_the_expected_status() {
+    let server = RunningServer::start(sightline_tests::server::access).await.with_session().await;
     let all = entries();
     assert!(all.len() >= 60, "{} attacks", all.len());
     let mut wrong = Vec::new();
@@ -206,14 +205,14 @@ async fn every_attack_of_the_table_is_answered_as_it_says() {
             let problem = format!("{} instead of {:?}: {:.200}", answer.status, entry.statuses, answer.body);
             wrong.push(format!("{} ({}): {problem}", entry.name, entry.line));
         }
-        // A successful login answers with the cookie and with nothing else.
+        // A successful login returns the cookie and no body.
         let is_login = entry.line.contains("/login") && answer.status == 204;
         let faults = answer.faults().into_iter().filter(|fault| !(is_login && fault.contains("token")));
         wrong.extend(faults.map(|fault| format!("{} ({}): {fault}", entry.name, entry.line)));
     }
     assert!(wrong.is_empty(), "{} of {} attacks:\n{}", wrong.len(), all.len(), wrong.join("\n"));
     println!("{} attacks", all.len());
-    let session = server.ask("GET", "sessions/s1", "").await;
+    let session = server.request("GET", "sessions/s1", "").await;
     assert_eq!(session.status, 200, "and the server goes on");
     assert_eq!(server.state.traverses().len(), 1);
 }

@@ -1,5 +1,5 @@
-//! A reverse proxy in front of the server, which publishes it in a folder: one that removes the folder from paths and one that
-//! keeps it, one that passes the Host on and one that names the server itself. Each adds forwarded headers that lie.
+//! A reverse proxy that publishes the server in a folder: with and without removing the folder from paths, and with the Host
+//! passed on or replaced by the server's own. Each proxy adds false forwarded headers.
 
 use std::net::SocketAddr;
 
@@ -12,31 +12,31 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
 use tokio_tungstenite::tungstenite;
 
-use super::{Answer, Listening, exchange};
+use super::{Answer, RunningServer, exchange};
 
-/// What the proxy does with requests.
+/// Behaviour of the proxy.
 #[derive(Clone, Copy, Debug)]
-struct Manner {
+struct ProxyConfig {
     keeps_folder: bool,
     passes_host: bool,
 }
 
 /// A server behind a proxy.
-struct Published {
-    server: Listening,
+struct ProxiedServer {
+    server: RunningServer,
     proxy: SocketAddr,
 }
 
-impl Published {
-    async fn start(manner: Manner) -> Self {
+impl ProxiedServer {
+    async fn start(config: ProxyConfig) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let proxy = listener.local_addr().unwrap();
         let public = PublicUrl::parse(&format!("http://{proxy}/sightline/")).unwrap();
-        let server = Listening::start(|port| access(port).behind_proxy(public)).await;
+        let server = RunningServer::start(|port| access(port).behind_proxy(public)).await;
         let address = server.address;
         tokio::spawn(async move {
             while let Ok((client, _)) = listener.accept().await {
-                tokio::spawn(pass(client, address, manner));
+                tokio::spawn(pass(client, address, config));
             }
         });
         Self { server, proxy }
@@ -51,8 +51,8 @@ impl Published {
     }
 }
 
-/// Passes one request and what follows it on.
-async fn pass(mut client: TcpStream, server: SocketAddr, manner: Manner) {
+/// Passes on one request and all following bytes.
+async fn pass(mut client: TcpStream, server: SocketAddr, config: ProxyConfig) {
     let (mut bytes, mut part) = (Vec::new(), [0; 4096]);
     let end = loop {
         if let Some(end) = bytes.windows(4).position(|bytes| bytes == b"\r\n\r\n") {
@@ -67,14 +67,14 @@ async fn pass(mut client: TcpStream, server: SocketAddr, manner: Manner) {
     let is_upgrade = head.to_ascii_lowercase().contains("\r\nupgrade:");
     let mut lines = head.lines();
     let mut first = lines.next().unwrap_or_default().to_owned();
-    if !manner.keeps_folder {
+    if !config.keeps_folder {
         first = first.replacen(" /sightline", " ", 1);
     }
     let mut passed = vec![first];
     for line in lines {
         let name = line.split(':').next().unwrap_or_default().to_ascii_lowercase();
         match name.as_str() {
-            "host" if !manner.passes_host => passed.push(format!("Host: {server}")),
+            "host" if !config.passes_host => passed.push(format!("Host: {server}")),
             "connection" if !is_upgrade => {}
             _ => passed.push(line.to_owned()),
         }
@@ -93,55 +93,55 @@ async fn pass(mut client: TcpStream, server: SocketAddr, manner: Manner) {
     if upstream.write_all(head.as_bytes()).await.is_ok()
         && upstream.write_all(&bytes[end + 4..]).await.is_ok()
     {
-        // Either side may leave first.
+        // Either side may close first.
         let _ = tokio::io::copy_bidirectional(&mut client, &mut upstream).await;
     }
 }
 
-const MANNERS: [Manner; 4] = [
-    Manner { keeps_folder: false, passes_host: false },
-    Manner { keeps_folder: false, passes_host: true },
-    Manner { keeps_folder: true, passes_host: false },
-    Manner { keeps_folder: true, passes_host: true },
+const PROXY_CONFIGS: [ProxyConfig; 4] = [
+    ProxyConfig { keeps_folder: false, passes_host: false },
+    ProxyConfig { keeps_folder: false, passes_host: true },
+    ProxyConfig { keeps_folder: true, passes_host: false },
+    ProxyConfig { keeps_folder: true, passes_host: true },
 ];
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_proxy_may_publish_the_server_in_a_folder() {
-    for manner in MANNERS {
-        let published = Published::start(manner).await;
+    for config in PROXY_CONFIGS {
+        let published = ProxiedServer::start(config).await;
         let json = "Content-Type: application/json\r\n";
         let login = published
             .send("POST", "/sightline/api/v1/login", json, &format!(r#"{{"token":"{TOKEN}"}}"#))
             .await;
-        assert_eq!(login.status, 204, "{manner:?}");
+        assert_eq!(login.status, 204, "{config:?}");
         let (pair, attributes) = login.header("set-cookie").split_once("; ").unwrap();
-        assert_eq!(attributes, "HttpOnly; SameSite=Strict; Path=/sightline/", "{manner:?}");
+        assert_eq!(attributes, "HttpOnly; SameSite=Strict; Path=/sightline/", "{config:?}");
         let origin = format!("Origin: http://{}\r\nCookie: {pair}\r\n{json}", published.proxy);
         let new = format!(r#"{{"traverse":"{}"}}"#, published.server.traverse);
         let begun = published.send("POST", "/sightline/api/v1/sessions", &origin, &new).await;
         let location = (begun.status, begun.header("location"));
-        assert_eq!(location, (201, "/sightline/api/v1/sessions/s1"), "{manner:?}");
+        assert_eq!(location, (201, "/sightline/api/v1/sessions/s1"), "{config:?}");
         let page = published.send("GET", "/sightline/api/v1/page", &format!("Cookie: {pair}\r\n"), "").await;
         assert!(page.body.contains("href=\"../../api/v1/sessions/s1/page\""), "{}", page.body);
         let image =
             format!("/sightline/api/v1/traverses/{}/steps/0/images/left.png", published.server.traverse);
         assert_eq!(published.send("GET", &image, &format!("Cookie: {pair}\r\n"), "").await.status, 200);
-        assert_eq!(published.send("GET", &image, "", "").await.status, 401, "{manner:?}");
-        assert_eq!(published.send("GET", "/sightline/", "", "").await.status, 200, "{manner:?}");
+        assert_eq!(published.send("GET", &image, "", "").await.status, 401, "{config:?}");
+        assert_eq!(published.send("GET", "/sightline/", "", "").await.status, 200, "{config:?}");
         let foreign = format!("Origin: http://evil.example\r\nCookie: {pair}\r\n{json}");
         assert_eq!(published.send("POST", "/sightline/api/v1/sessions", &foreign, &new).await.status, 403);
         assert_eq!(events(&published, pair, &format!("http://{}", published.proxy)).await.unwrap(), 101);
         for origin in ["http://evil.example", "null"] {
             match events(&published, pair, origin).await {
-                Err(tungstenite::Error::Http(response)) => assert_eq!(response.status(), 403, "{manner:?}"),
-                other => panic!("{manner:?} {origin}: {other:?}"),
+                Err(tungstenite::Error::Http(response)) => assert_eq!(response.status(), 403, "{config:?}"),
+                other => panic!("{config:?} {origin}: {other:?}"),
             }
         }
     }
 }
 
 /// Opens the WebSocket and reads its first event.
-async fn events(published: &Published, cookie: &str, origin: &str) -> Result<u16, tungstenite::Error> {
+async fn events(published: &ProxiedServer, cookie: &str, origin: &str) -> Result<u16, tungstenite::Error> {
     let url = format!("ws://{}/sightline/api/v1/events", published.proxy);
     let mut request = tungstenite::client::IntoClientRequest::into_client_request(url)?;
     request.headers_mut().insert(header::COOKIE, HeaderValue::from_str(cookie).unwrap());
@@ -154,11 +154,11 @@ async fn events(published: &Published, cookie: &str, origin: &str) -> Result<u16
 
 #[tokio::test(flavor = "multi_thread")]
 async fn the_folder_without_its_slash_leads_to_the_page() {
-    let published = Published::start(MANNERS[2]).await;
+    let published = ProxiedServer::start(PROXY_CONFIGS[2]).await;
     let answer = published.send("GET", "/sightline", "", "").await;
     assert_eq!((answer.status, answer.header("location")), (308, "/sightline/"));
-    // Without the setting the same headers and paths mean nothing.
-    let plain = Listening::start(access).await;
+    // Without the setting, the same headers and paths have no effect.
+    let plain = RunningServer::start(access).await;
     let headers = ["Host: $HOST", "Authorization: Bearer $TOKEN", "X-Forwarded-Prefix: /sightline"];
     assert_eq!(plain.send("GET /sightline/api/v1/version HTTP/1.1", &headers, "").await.status, 404);
     assert_eq!(plain.send("GET /api/v1/version HTTP/1.1", &headers, "").await.status, 200);
@@ -166,16 +166,16 @@ async fn the_folder_without_its_slash_leads_to_the_page() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn the_page_works_in_the_folder_of_a_proxy() {
-    let published = Published::start(MANNERS[1]).await;
+    let published = ProxiedServer::start(PROXY_CONFIGS[1]).await;
     let browser = Browser::start().await;
     browser.goto(&format!("http://{}/sightline/#token={TOKEN}", published.proxy)).await;
     browser.wait_for_viewer().await;
     let shown = "s.phase === 'ready' && s.shown && s.image_to_screen !== null";
-    browser.wait_status("the first image", shown).await;
+    browser.wait_for_status("the first image", shown).await;
     let address = browser.evaluate("return location.href").await;
     assert!(!address.as_str().unwrap().contains(TOKEN), "{address}");
     assert_eq!(browser.console_errors().await, Vec::<String>::new());
-    // Without the cookie the page asks for the token, and takes it.
+    // Without the cookie, the page asks for the token and accepts it.
     let other = Browser::start().await;
     other.goto(&format!("http://{}/sightline/", published.proxy)).await;
     other.wait_for("the form", "return !document.getElementById('login').hidden").await;

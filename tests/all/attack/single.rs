@@ -1,9 +1,9 @@
-//! Attacks of one kind of route each: name, request line, headers, body, and the statuses that are right.
+//! Attacks on a single route each: name, request line, headers, body, and the permitted statuses.
 
 use super::table::{HOST, JSON, KEY, Single};
 
 pub(super) const SINGLE: &[Single] = &[
-    // The right ones.
+    // Valid requests.
     ("token as header", "GET /api/v1/version", &[HOST, KEY], "", &[200]),
     ("token as cookie", "GET /api/v1/version", &[HOST, "Cookie: sightline-$PORT=$TOKEN"], "", &[200]),
     (
@@ -23,7 +23,7 @@ pub(super) const SINGLE: &[Single] = &[
         "",
         &[200],
     ),
-    // The token where it must not be.
+    // The token in places where it is not accepted.
     ("token in the query", "GET /api/v1/version?token=$TOKEN", &[HOST], "", &[401]),
     ("token in the path", "GET /api/v1/$TOKEN/version", &[HOST], "", &[401]),
     ("token in the fragment", "GET /api/v1/version#token=$TOKEN", &[HOST], "", &[400, 401]),
@@ -46,7 +46,7 @@ pub(super) const SINGLE: &[Single] = &[
         "",
         &[200],
     ),
-    // Ways around the check of the path.
+    // Attempts to bypass the check of the path.
     ("route with two slashes", "GET //api/v1/version", &[HOST], "", &[404]),
     ("route with a dot", "GET /./api/v1/version", &[HOST], "", &[404]),
     ("route with dots", "GET /x/../api/v1/version", &[HOST], "", &[404]),
@@ -126,7 +126,7 @@ pub(super) const SINGLE: &[Single] = &[
     ),
     ("a method of our own", "BREAK /api/v1/version", &[HOST, KEY], "", &[405]),
     ("POST to the page", "POST /", &[HOST, JSON], "{}", &[405]),
-    // What a form of another site can send.
+    // Requests that a form of another site can send.
     (
         "form",
         "POST /api/v1/sessions",
@@ -201,7 +201,7 @@ pub(super) const SINGLE: &[Single] = &[
         "0\r\n\r\n",
         &[0, 400, 501],
     ),
-    // Traversal: no name in a path becomes the name of a file.
+    // Traversal: no name in a path is used as a file name.
     ("traversal in the page", "GET /../Cargo.toml", &[HOST], "", &[404]),
     ("traversal in the page, encoded", "GET /%2e%2e/Cargo.toml", &[HOST], "", &[404]),
     ("traversal in the page, slash encoded", "GET /..%2fCargo.toml", &[HOST], "", &[404]),
@@ -260,7 +260,7 @@ pub(super) const SINGLE: &[Single] = &[
         "",
         &[404],
     ),
-    // Rerun: its own stream is not served, under any of its names.
+    // Rerun: its own stream is not served under any of its names.
     (
         "gRPC read",
         "POST /rerun.sdk_comms.v1alpha1.MessageProxyService/ReadMessages",

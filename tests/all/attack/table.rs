@@ -1,16 +1,16 @@
-//! The table: what is sent and which status it must get. `$HOST`, `$PORT`, `$TOKEN` and `$DRIVE` are replaced.
+//! The table: the request, and the required status. `$HOST`, `$PORT`, `$TOKEN` and `$DRIVE` are replaced.
 
-/// A kind of route, with a request of each.
-pub(super) struct Kind {
+/// A kind of route, with a request for it.
+pub(super) struct RouteKind {
     pub name: &'static str,
     pub line: &'static str,
     pub headers: &'static [&'static str],
     pub body: &'static str,
     /// The status of our own request.
     pub status: u16,
-    /// Whether an `Origin` is checked: it changes something, or it is an upgrade.
+    /// Whether an `Origin` is checked, because the request changes something or is an upgrade.
     pub changes: bool,
-    /// Whether it needs no token.
+    /// Whether the route needs no token.
     pub is_open: bool,
 }
 
@@ -20,11 +20,11 @@ pub(super) struct Entry {
     pub line: String,
     pub headers: Vec<String>,
     pub body: String,
-    /// Statuses that are right; 0 is a closed connection.
+    /// Permitted statuses; 0 is a closed connection.
     pub statuses: Vec<u16>,
 }
 
-/// One attack, as it is written down.
+/// One attack, in short form.
 pub(super) type Single = (&'static str, &'static str, &'static [&'static str], &'static str, &'static [u16]);
 
 impl Entry {
@@ -38,9 +38,9 @@ impl Entry {
         }
     }
 
-    /// A request of a kind with other headers in front of those of the kind that `keeps` keeps.
+    /// A request of a kind, with other headers before those of the kind for which `keeps` is true.
     pub(super) fn of(
-        kind: &Kind,
+        kind: &RouteKind,
         name: &str,
         status: u16,
         keeps: fn(&str) -> bool,
@@ -70,12 +70,12 @@ const UPGRADE: &[&str] = &[
     "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==",
 ];
 
-const fn reads(name: &'static str, line: &'static str) -> Kind {
-    Kind { name, line, headers: &[], body: "", status: 200, changes: false, is_open: false }
+const fn reads(name: &'static str, line: &'static str) -> RouteKind {
+    RouteKind { name, line, headers: &[], body: "", status: 200, changes: false, is_open: false }
 }
 
-pub(super) const KINDS: &[Kind] = &[
-    Kind { is_open: true, ..reads("page", "GET /") },
+pub(super) const KINDS: &[RouteKind] = &[
+    RouteKind { is_open: true, ..reads("page", "GET /") },
     reads("JSON", "GET /api/v1/version"),
     reads("OpenAPI", "GET /api/v1/openapi.json"),
     reads("image", "GET /api/v1/traverses/$DRIVE/steps/0/images/left.png"),
@@ -83,22 +83,22 @@ pub(super) const KINDS: &[Kind] = &[
     reads("plain page", "GET /api/v1/page"),
     reads("Rerun viewer", "GET /api/v1/rerun/index.html"),
     reads("Rerun stream", "GET /api/v1/sessions/s1/rerun/live.rrd"),
-    Kind { headers: UPGRADE, status: 101, changes: true, ..reads("WebSocket", "GET /api/v1/events") },
-    Kind {
+    RouteKind { headers: UPGRADE, status: 101, changes: true, ..reads("WebSocket", "GET /api/v1/events") },
+    RouteKind {
         headers: &[JSON],
         body: r#"{"target":null,"run":0,"step":0}"#,
         changes: true,
         ..reads("change", "PUT /api/v1/sessions/s1/cursor")
     },
-    Kind {
+    RouteKind {
         headers: &[JSON],
         body: r#"{"text":"x"}"#,
         status: 422,
         changes: true,
         ..reads("creation", "POST /api/v1/sessions/s1/targets")
     },
-    Kind { status: 404, changes: true, ..reads("removal", "DELETE /api/v1/sessions/s99") },
-    Kind {
+    RouteKind { status: 404, changes: true, ..reads("removal", "DELETE /api/v1/sessions/s99") },
+    RouteKind {
         headers: &[JSON],
         body: r#"{"token":"$TOKEN"}"#,
         status: 204,
@@ -136,7 +136,7 @@ pub(super) const FOREIGN_ORIGINS: &[&str] = &[
     "Origin: https://rerun.io",
 ];
 
-/// Wrong credentials: each takes the place of the right header.
+/// Wrong credentials: each replaces the correct header.
 pub(super) const CREDENTIALS: &[&str] = &[
     "Accept: */*",
     "Authorization: Bearer wrong-token-of-another",

@@ -7,10 +7,10 @@ use std::sync::PoisonError;
 use serde_json::json;
 use sightline_tests::server::small_drive;
 
-use super::{ONE, begin, has_ended, tell, until};
-use crate::keeping::Killable;
+use super::{EXCLUSIVE, begin, has_ended, print_row, until};
+use crate::persistence::ServerProcess;
 
-/// A library whose clock is off by so many seconds as the file `SIGHTLINE_CLOCK` says; none without a C compiler.
+/// Builds a preload library that shifts the clock by the seconds in the file `SIGHTLINE_CLOCK`; `None` without a C compiler.
 fn library(folder: &Path) -> Option<PathBuf> {
     const SOURCE: &str = r#"
         #define _GNU_SOURCE
@@ -40,18 +40,18 @@ fn library(folder: &Path) -> Option<PathBuf> {
 #[test]
 #[cfg(target_os = "linux")]
 fn drill_the_clock_jumps() {
-    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let _exclusive = EXCLUSIVE.lock().unwrap_or_else(PoisonError::into_inner);
     let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
     let Some(library) = library(data.path()) else {
-        tell("clock", "left out: there is no C compiler");
+        print_row("clock", "left out: there is no C compiler");
         return;
     };
     let shift = data.path().join("shift");
-    // 50 years back: before 1970 the HTTP library cannot write its date; then a day on, an hour back, and 300 years on.
+    // 50 years back (the HTTP library cannot write a date before 1970), one day forward, one hour back, 300 years forward.
     let shifts: [i64; 4] = [-1_577_880_000, 86_400, -3_600, 9_467_280_000];
     std::fs::write(&shift, shifts[0].to_string()).unwrap();
     let environment = [("LD_PRELOAD", library.as_os_str()), ("SIGHTLINE_CLOCK", shift.as_os_str())];
-    let server = Killable::start_with(&environment, drive.path(), &data.path().join("state"));
+    let server = ServerProcess::start_with(&environment, drive.path(), &data.path().join("state"));
     let mut made = Vec::new();
     for seconds in shifts {
         std::fs::write(&shift, seconds.to_string()).unwrap();
@@ -59,7 +59,7 @@ fn drill_the_clock_jumps() {
         until(&server, &format!("sessions/{session}/targets/0/runs/0"), has_ended);
         let note =
             server.json("POST", &format!("sessions/{session}/notes"), &json!({ "step": 0, "text": "x" }));
-        // Times of a recording are counted from 1970: an earlier one is refused with a sentence.
+        // Times of a recording are counted from 1970: an earlier one is refused with an error.
         let recording = format!("sessions/{session}/exports/recording.rrd");
         let (status, body) = server.answer("GET", &recording, "", "");
         assert!(status == 200 || seconds < 0 && body.contains("1970"), "{status}: {}", body.escape_debug());
@@ -67,5 +67,5 @@ fn drill_the_clock_jumps() {
         made.push(note["made"].as_str().unwrap().chars().take(10).collect::<String>());
     }
     assert_eq!(server.get("health")["notices"], json!([]));
-    tell("the clock jumps", &format!("sessions, runs, notes and exports at {}", made.join(", ")));
+    print_row("the clock jumps", &format!("sessions, runs, notes and exports at {}", made.join(", ")));
 }

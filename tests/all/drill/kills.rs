@@ -1,7 +1,7 @@
-//! kill −9 at random moments, while everything changes that a server keeps.
+//! kill −9 at random moments during changes to everything that the server stores.
 //!
-//! One client makes one change after the other and notes what was acknowledged. The change under way when the program is
-//! killed may be there or not; everything else must be exactly as it was acknowledged.
+//! One client makes one change after the other and records the acknowledged ones. The change in progress at the kill may be
+//! stored or not; everything else must be exactly as acknowledged.
 
 use std::collections::BTreeMap;
 use std::io::{Read, Write};
@@ -12,44 +12,44 @@ use std::time::Duration;
 use serde_json::{Value, json};
 use sightline_tests::server::{PIXEL, TOKEN, small_drive};
 
-use super::{ONE, has_ended, tell, until};
-use crate::keeping::Killable;
+use super::{EXCLUSIVE, has_ended, print_row, until};
+use crate::persistence::ServerProcess;
 
 /// Kills in the ordinary tests.
 const KILLS: u64 = 3;
-/// Sessions at a time; the oldest is removed then.
+/// Maximum number of sessions; the oldest is removed to make room.
 const SESSIONS: usize = 4;
-/// Forks of a session.
+/// Maximum number of forks of a session.
 const FORKS: u64 = 3;
 
 fn kills() -> u64 {
     std::env::var("SIGHTLINE_KILLS").map_or(KILLS, |text| text.parse().expect("a number"))
 }
 
-/// Numbers that look random, the same in each run.
-struct Chance(u64);
+/// A pseudo-random sequence, the same in each run.
+struct Rng(u64);
 
-impl Chance {
+impl Rng {
     fn below(&mut self, limit: u64) -> u64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 33) % limit
     }
 }
 
-/// What the server keeps, by the paths at which it shows it, without what time changes.
+/// The data that the server stores, by the API path that shows them, without values that depend on time.
 type Facts = BTreeMap<String, Value>;
 
-/// The fact that is a number of the client: the largest one that a session had.
+/// Key of a fact that only the client has: the largest number that a session had.
 const LAST: &str = "last";
-/// What stands for a longer form of a session.
+/// Placeholder for the new form of a session, of which only its growth is checked.
 const LONGER: &str = "longer";
 
-/// A run as it was ordered.
+/// A run as requested: number, fork, settings.
 fn run(view: &Value) -> Value {
     json!([view["number"], view["fork"], view["settings"]])
 }
 
-/// The targets of a session as they were designated, with their runs.
+/// The targets of a session as designated, with their runs.
 fn targets(view: &Value) -> Value {
     let runs = |target: &Value| target["runs"].as_array().unwrap().iter().map(run).collect::<Value>();
     let targets = view["targets"].as_array().unwrap().iter();
@@ -58,8 +58,8 @@ fn targets(view: &Value) -> Value {
         .collect()
 }
 
-/// What a path shows, without what time changes.
-fn shown(server: &Killable, path: &str) -> Value {
+/// The stored data at a path, without values that depend on time.
+fn shown(server: &ServerProcess, path: &str) -> Value {
     let (status, body) = server.answer("GET", path, "", "");
     if status != 200 {
         return Value::Null;
@@ -77,18 +77,18 @@ fn shown(server: &Killable, path: &str) -> Value {
     }
 }
 
-/// The client: what was acknowledged, and what may be there in addition.
+/// The client: the acknowledged changes, and the one in progress.
 struct Client {
     address: String,
     facts: Facts,
-    under_way: Option<(String, Value)>,
+    in_progress: Option<(String, Value)>,
     acknowledged: u64,
-    chance: Chance,
+    rng: Rng,
 }
 
 impl Client {
-    /// Sends a request; none when the server was killed meanwhile.
-    fn ask(&self, method: &str, path: &str, body: &Value) -> Option<(u16, Value)> {
+    /// Sends a request; `None` if the server was killed during it.
+    fn send(&self, method: &str, path: &str, body: &Value) -> Option<(u16, Value)> {
         let body = if body.is_null() { String::new() } else { body.to_string() };
         let mut stream = TcpStream::connect(&self.address).ok()?;
         let (length, host) = (body.len(), &self.address);
@@ -104,11 +104,11 @@ impl Client {
         Some((head.split(' ').nth(1)?.parse().ok()?, serde_json::from_str(body).unwrap_or(Value::Null)))
     }
 
-    /// A change, with what its path shows once it is made; none when the server was killed meanwhile.
+    /// Makes a change; `after` is the value at the path `at` after it. `None` if the server was killed during it.
     fn change(&mut self, method: &str, path: &str, body: &Value, at: &str, after: Value) -> Option<Value> {
-        self.under_way = Some((at.to_owned(), after.clone()));
-        let (status, answer) = self.ask(method, path, body)?;
-        self.under_way = None;
+        self.in_progress = Some((at.to_owned(), after.clone()));
+        let (status, answer) = self.send(method, path, body)?;
+        self.in_progress = None;
         assert!(status < 500 || status == 503, "{method} {path}: {status} {answer}");
         if (200..300).contains(&status) {
             self.facts.insert(at.to_owned(), after);
@@ -117,7 +117,7 @@ impl Client {
         Some(answer)
     }
 
-    /// A list with one entry more.
+    /// The list at a path with one more entry.
     fn with(&self, path: &str, entry: Value) -> Value {
         let mut list = self.facts.get(path).and_then(Value::as_array).cloned().unwrap_or_default();
         list.push(entry);
@@ -129,7 +129,7 @@ impl Client {
         list.iter().map(|id| id.as_str().unwrap().to_owned()).collect()
     }
 
-    /// Begins a session with a target. Its number follows the largest one that ever was, also one that was under way.
+    /// Begins a session with a target. Its number follows the largest one so far, including a change in progress at a kill.
     fn begin(&mut self, traverse: &str) -> Option<()> {
         let next = 1 + self.facts.get(LAST).and_then(Value::as_u64).unwrap_or(0);
         let id = format!("s{next}");
@@ -141,14 +141,14 @@ impl Client {
         }
         let [x, y] = PIXEL;
         let target = json!({ "step": 0, "pixel": { "x": x, "y": y }, "label": "rock" });
-        self.longer(&format!("sessions/{id}"), "targets", &target)
+        self.grow(&format!("sessions/{id}"), "targets", &target)
     }
 
-    /// A change of a session whose new form is in the answer: until then it is only known to be longer.
-    fn longer(&mut self, session: &str, below: &str, body: &Value) -> Option<()> {
-        self.under_way = Some((session.to_owned(), json!(LONGER)));
-        let (status, answer) = self.ask("POST", &format!("{session}/{below}"), body)?;
-        self.under_way = None;
+    /// Makes a change whose result is only in the response; without a response, the session is only known to have grown.
+    fn grow(&mut self, session: &str, below: &str, body: &Value) -> Option<()> {
+        self.in_progress = Some((session.to_owned(), json!(LONGER)));
+        let (status, answer) = self.send("POST", &format!("{session}/{below}"), body)?;
+        self.in_progress = None;
         assert!(status < 500 || status == 503, "{session}/{below}: {status} {answer}");
         if (200..300).contains(&status) {
             self.acknowledged += 1;
@@ -165,17 +165,17 @@ impl Client {
         Some(())
     }
 
-    /// Makes one change after the other until the server is killed.
-    fn work(&mut self, traverse: &str) -> Option<()> {
+    /// Makes changes until the server is killed.
+    fn change_until_killed(&mut self, traverse: &str) -> Option<()> {
         loop {
             let sessions = self.sessions();
             if sessions.len() < 2 {
                 self.begin(traverse)?;
                 continue;
             }
-            let id = sessions[self.chance.below(sessions.len() as u64) as usize].clone();
+            let id = sessions[self.rng.below(sessions.len() as u64) as usize].clone();
             let session = format!("sessions/{id}");
-            match self.chance.below(16) {
+            match self.rng.below(16) {
                 0 if sessions.len() < SESSIONS => self.begin(traverse)?,
                 0 => {
                     let oldest = &sessions[0];
@@ -187,28 +187,28 @@ impl Client {
                 1..=4 => {
                     let at = format!("{session}/notes");
                     let number = self.facts[&at].as_array().unwrap().len() + 1;
-                    let text = format!("note {number} {}", "y".repeat(self.chance.below(3000) as usize));
+                    let text = format!("note {number} {}", "y".repeat(self.rng.below(3000) as usize));
                     let after = self.with(&at, json!([number, text]));
                     self.change("POST", &at, &json!({ "step": 0, "text": text }), &at, after)?;
                 }
                 5..=8 => {
-                    let name = format!("documents/layout-{}", self.chance.below(3));
+                    let name = format!("documents/layout-{}", self.rng.below(3));
                     let value = json!({ "count": self.acknowledged, "third": 1.0 / 3.0 });
                     self.change("PUT", &name, &value.clone(), &name, value.clone())?;
                 }
                 9..=10 => self.mark(&session)?,
                 11..=12 => self.branch(&session)?,
                 13 => self.question(&session)?,
-                14 if self.chance.below(8) == 0 => self.study()?,
+                14 if self.rng.below(8) == 0 => self.study()?,
                 _ => {
-                    let cursor = json!({ "target": 0, "run": 0, "step": self.chance.below(5) });
-                    self.ask("PUT", &format!("{session}/cursor"), &cursor)?;
+                    let cursor = json!({ "target": 0, "run": 0, "step": self.rng.below(5) });
+                    self.send("PUT", &format!("{session}/cursor"), &cursor)?;
                 }
             }
         }
     }
 
-    /// Sets a breakpoint that is not there yet.
+    /// Sets a new breakpoint.
     fn mark(&mut self, session: &str) -> Option<()> {
         let at = format!("{session}/breakpoints");
         let expression = format!("ncc < 0.{}", 100 + self.facts[&at].as_array().unwrap().len());
@@ -222,30 +222,30 @@ impl Client {
             return Some(());
         }
         let new = json!({ "run": 0, "from_step": 2, "settings": { "ncc_min": 0.9999 } });
-        self.longer(session, "targets/0/runs", &new)
+        self.grow(session, "targets/0/runs", &new)
     }
 
-    /// Asks what would have saved the step that the first branch lost.
+    /// Requests the counterfactual answer for the step that the first branch lost.
     fn question(&mut self, session: &str) -> Option<()> {
         let at = format!("{session}/targets/0/runs/1/steps/2/counterfactual");
         self.change("POST", &at, &json!({}), &at, json!(true)).map(|_| ())
     }
 
-    /// Starts a study and stops it again, so that it takes no time.
+    /// Starts a study and stops it, so that it takes no time.
     fn study(&mut self) -> Option<()> {
         let at = "studies/jobs";
         let number = self.facts.get(at).and_then(Value::as_array).map_or(1, |jobs| jobs.len() + 1);
         let after = self.with(at, json!([format!("study-{number}"), "straight"]));
         self.change("POST", at, &json!({ "study": "straight", "seeds": [1] }), at, after)?;
-        self.ask("POST", &format!("studies/jobs/study-{number}/cancel"), &Value::Null).map(|_| ())
+        self.send("POST", &format!("studies/jobs/study-{number}/cancel"), &Value::Null).map(|_| ())
     }
 }
 
-/// Compares everything with what was acknowledged, and takes over what was under way; how many facts it compared.
-fn check(server: &Killable, client: &mut Client, round: u64) -> u64 {
+/// Compares all facts with the acknowledged ones, adopts the change in progress, and returns the number of facts compared.
+fn check(server: &ServerProcess, client: &mut Client, round: u64) -> u64 {
     assert_eq!(server.get("health")["notices"], json!([]), "round {round}");
-    let under_way = client.under_way.take();
-    if let Some((at, after)) = &under_way {
+    let in_progress = client.in_progress.take();
+    if let Some((at, after)) = &in_progress {
         let (now, before) = (shown(server, at), client.facts.get(at).cloned().unwrap_or_default());
         let is_longer = *after == json!(LONGER) && now.to_string().len() > before.to_string().len();
         let is_not_asked = before.is_null() && now == json!(false);
@@ -266,8 +266,8 @@ fn check(server: &Killable, client: &mut Client, round: u64) -> u64 {
     client.facts.len() as u64
 }
 
-/// A session that was begun or removed while the program was killed: its parts are there or gone with it.
-fn settle_sessions(server: &Killable, client: &mut Client) {
+/// Reconciles a session whose creation or removal was in progress at the kill: its parts exist or are gone with it.
+fn settle_sessions(server: &ServerProcess, client: &mut Client) {
     let sessions = client.sessions();
     let is_of = |path: &str, id: &str| {
         path == format!("sessions/{id}") || path.starts_with(&format!("sessions/{id}/"))
@@ -287,8 +287,8 @@ fn settle_sessions(server: &Killable, client: &mut Client) {
     }
 }
 
-/// The rows of a session's runs, once all have ended, by what leads to them.
-fn rows(server: &Killable, session: &str) -> BTreeMap<String, String> {
+/// The rows of a session's runs by their fork, once all have ended.
+fn rows(server: &ServerProcess, session: &str) -> BTreeMap<String, String> {
     let runs = shown(server, &format!("sessions/{session}"));
     let runs = runs[0][3].as_array().cloned().unwrap_or_default();
     let mut found = BTreeMap::new();
@@ -303,25 +303,25 @@ fn rows(server: &Killable, session: &str) -> BTreeMap<String, String> {
 }
 
 #[test]
-fn killed_at_any_moment_the_program_has_what_it_acknowledged() {
-    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+fn killed_at_any_moment_the_program_loses_nothing_confirmed() {
+    let _exclusive = EXCLUSIVE.lock().unwrap_or_else(PoisonError::into_inner);
     let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
     let kills = kills();
     let mut client = Client {
         address: String::new(),
         facts: Facts::new(),
-        under_way: None,
+        in_progress: None,
         acknowledged: 0,
-        chance: Chance(2026),
+        rng: Rng(2026),
     };
     let (mut checked, mut runs) = (0, 0);
     let mut bits = BTreeMap::<String, String>::new();
     for round in 0..=kills {
-        let server = Killable::start(drive.path(), data.path());
+        let server = ServerProcess::start(drive.path(), data.path());
         checked += check(&server, &mut client, round);
-        // The runs that were interrupted go on to the same bits, those of one session in each round.
+        // Interrupted runs continue to the same bits; each round checks one session.
         let sessions = client.sessions();
-        if let Some(id) = sessions.get(client.chance.below(SESSIONS as u64) as usize) {
+        if let Some(id) = sessions.get(client.rng.below(SESSIONS as u64) as usize) {
             for (fork, text) in rows(&server, id) {
                 runs += 1;
                 let first = bits.entry(fork.clone()).or_insert_with(|| text.clone());
@@ -333,10 +333,10 @@ fn killed_at_any_moment_the_program_has_what_it_acknowledged() {
         }
         let traverse = server.get("traverses")[0]["id"].as_str().unwrap().to_owned();
         client.address.clone_from(&server.address);
-        let moment = Duration::from_millis(5 + client.chance.below(400));
+        let moment = Duration::from_millis(5 + client.rng.below(400));
         client = std::thread::scope(|scope| {
             let working = scope.spawn(move || {
-                assert!(client.work(&traverse).is_none());
+                assert!(client.change_until_killed(&traverse).is_none());
                 client
             });
             std::thread::sleep(moment);
@@ -345,7 +345,7 @@ fn killed_at_any_moment_the_program_has_what_it_acknowledged() {
         });
     }
     assert!(client.acknowledged >= kills, "{} changes in {kills} rounds", client.acknowledged);
-    tell(
+    print_row(
         "kill −9 at random moments",
         &format!(
             "{kills} kills, {} changes acknowledged, {checked} facts compared: 0 lost, 0 invented; {runs} runs with the same bits",

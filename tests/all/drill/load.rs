@@ -1,4 +1,4 @@
-//! Many sessions, slow connections, exports, abandoned questions; reading beside long work.
+//! Load: many sessions, slow connections, exports, abandoned questions; reading during long computations.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -8,11 +8,11 @@ use std::time::{Duration, Instant};
 use serde_json::json;
 use sightline_tests::server::{long_recording, small_drive};
 
-use super::{ONE, Watched, begin, has_ended, p95_ms, scale, tell, until};
-use crate::keeping::Killable;
+use super::{EXCLUSIVE, Watched, begin, has_ended, p95_ms, print_row, scale, until};
+use crate::persistence::ServerProcess;
 
-/// Reads a step as the page does: the record, one image, and the cursor moves there. How long it took.
-fn step(server: &Killable, session: &str, traverse: &str, step: usize) -> Duration {
+/// Reads a step as the page does (record, one image, cursor move); returns the time that it took.
+fn step(server: &ServerProcess, session: &str, traverse: &str, step: usize) -> Duration {
     let begun = Instant::now();
     let cursor = json!({ "target": 0, "run": 0, "step": step });
     server.json("PUT", &format!("sessions/{session}/cursor"), &cursor);
@@ -21,12 +21,12 @@ fn step(server: &Killable, session: &str, traverse: &str, step: usize) -> Durati
     begun.elapsed()
 }
 
-fn traverse(server: &Killable) -> String {
+fn traverse(server: &ServerProcess) -> String {
     server.get("traverses")[0]["id"].as_str().unwrap().to_owned()
 }
 
-/// Many sessions step for some time and are removed; how long each step took.
-fn step_through(server: &Killable, traverse: &str, count: usize, lasting: Duration) -> Vec<Duration> {
+/// Steps through many sessions for some time and removes them; returns the time of each step.
+fn step_through(server: &ServerProcess, traverse: &str, count: usize, lasting: Duration) -> Vec<Duration> {
     let sessions: Vec<String> = (0..count).map(|_| begin(server, 0)).collect();
     for session in &sessions {
         until(server, &format!("sessions/{session}/targets/0/runs/0"), has_ended);
@@ -52,34 +52,34 @@ fn step_through(server: &Killable, traverse: &str, count: usize, lasting: Durati
 
 #[test]
 fn drill_many_sessions_step_at_the_same_time() {
-    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let _exclusive = EXCLUSIVE.lock().unwrap_or_else(PoisonError::into_inner);
     let (count, lasting) = (scale(64, 6), Duration::from_secs(scale(90, 1)));
     let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
-    let server = Killable::start(drive.path(), data.path());
+    let server = ServerProcess::start(drive.path(), data.path());
     let traverse = traverse(&server);
-    // What is made once and kept: images, threads of the tracker.
+    // First create what is created once and stored: images, threads of the tracker.
     step_through(&server, &traverse, scale(4, 1), Duration::from_secs(scale(2, 0)));
     let mut watched = Watched::of(&server, Duration::from_secs(scale(15, 12)), || {
         step_through(&server, &traverse, count, lasting)
     });
     let (steps, p95) = (watched.value.len(), p95_ms(&mut watched.value));
-    watched.tell(
+    watched.print_row(
         &format!("{count} sessions step for {} s", lasting.as_secs()),
         &format!("{steps} steps, p95 {p95:.0} ms"),
     );
-    watched.assert_given_back();
+    watched.assert_released();
     assert_eq!(server.get("health")["notices"], json!([]));
 }
 
-/// A connection that sends the head of a request letter by letter.
-struct Dribble {
+/// A connection that sends the head of a request one character at a time.
+struct SlowConnection {
     stream: TcpStream,
     sent: usize,
 }
 
-impl Dribble {
-    /// Sends another letter; whether the server has not closed the connection.
-    fn goes_on(&mut self) -> bool {
+impl SlowConnection {
+    /// Sends another character; returns whether the connection is still open.
+    fn send_next(&mut self) -> bool {
         const HEAD: &[u8] = b"GET /api/v1/version HTTP/1.1\r\nX-Slow: ";
         self.stream.set_nonblocking(true).unwrap();
         let read = self.stream.read(&mut [0_u8; 512]);
@@ -93,20 +93,20 @@ impl Dribble {
 #[cfg(unix)]
 #[test]
 fn drill_slow_connections_leave_room_for_others() {
-    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let _exclusive = EXCLUSIVE.lock().unwrap_or_else(PoisonError::into_inner);
     let (count, lasting) = (scale(900, 120), Duration::from_secs(scale(75, 2)));
     let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
     // Fewer descriptors than slow connections.
-    let server = Killable::start_bounded(scale(256, 128), &[], drive.path(), data.path());
+    let server = ServerProcess::start_bounded(scale(256, 128), &[], drive.path(), data.path());
     let watched = Watched::of(&server, Duration::from_secs(scale(5, 1)), || {
-        // A client that is closed comes back at once.
-        let connect = || Dribble { stream: TcpStream::connect(&server.address).unwrap(), sent: 0 };
-        let mut open: Vec<Dribble> = (0..count).map(|_| connect()).collect();
+        // A client whose connection is closed reconnects immediately.
+        let connect = || SlowConnection { stream: TcpStream::connect(&server.address).unwrap(), sent: 0 };
+        let mut open: Vec<SlowConnection> = (0..count).map(|_| connect()).collect();
         let begun = Instant::now();
         let (mut times, mut closed) = (Vec::new(), 0);
         while begun.elapsed() < lasting {
             for one in &mut open {
-                if !one.goes_on() {
+                if !one.send_next() {
                     closed += 1;
                     *one = connect();
                 }
@@ -119,19 +119,19 @@ fn drill_slow_connections_leave_room_for_others() {
         (times.len(), p95_ms(&mut times), closed)
     });
     let (answered, p95, closed) = watched.value;
-    watched.tell(
+    watched.print_row(
         &format!("{count} slow connections for {} s, {} descriptors", lasting.as_secs(), scale(256, 128)),
         &format!("{answered} others answered, p95 {p95:.0} ms; {closed} slow ones closed"),
     );
-    watched.assert_given_back();
+    watched.assert_released();
 }
 
 #[test]
 fn drill_exports_give_everything_back() {
-    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let _exclusive = EXCLUSIVE.lock().unwrap_or_else(PoisonError::into_inner);
     let count: usize = scale(1000, 12);
     let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
-    let server = Killable::start(drive.path(), data.path());
+    let server = ServerProcess::start(drive.path(), data.path());
     let session = begin(&server, 0);
     until(&server, &format!("sessions/{session}/targets/0/runs/0"), has_ended);
     let files = ["recording.rrd", "rows.csv", "rows.parquet", "report.html"];
@@ -139,20 +139,20 @@ fn drill_exports_give_everything_back() {
         let file = files[number % files.len()];
         server.bytes(&format!("sessions/{session}/exports/{file}")).len()
     };
-    // What is made once and kept: fonts, the sources of the page, caches.
+    // First create what is created once and stored: fonts, the sources of the page, caches.
     (0..files.len()).for_each(|number| assert!(export(number) > 0));
     let watched =
         Watched::of(&server, Duration::from_secs(scale(15, 1)), || (0..count).map(export).sum::<usize>());
-    watched.tell(&format!("{count} exports"), &format!("{} MB written", watched.value / 1_000_000));
-    watched.assert_given_back();
+    watched.print_row(&format!("{count} exports"), &format!("{} MB written", watched.value / 1_000_000));
+    watched.assert_released();
 }
 
 #[test]
 fn drill_abandoned_questions_end() {
-    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let _exclusive = EXCLUSIVE.lock().unwrap_or_else(PoisonError::into_inner);
     let count = scale(100, 8);
     let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
-    let server = Killable::start(drive.path(), data.path());
+    let server = ServerProcess::start(drive.path(), data.path());
     let session = begin(&server, 0);
     until(&server, &format!("sessions/{session}/targets/0/runs/0"), has_ended);
     let path = format!("sessions/{session}/targets/0/runs/0/steps/2/what_if");
@@ -171,19 +171,19 @@ fn drill_abandoned_questions_end() {
         }
         ask()
     });
-    watched.tell(
+    watched.print_row(
         &format!("{count} abandoned questions (what_if)"),
         &format!("the next one takes {:.2} s, {alone:.2} s alone", watched.value),
     );
-    watched.assert_given_back();
+    watched.assert_released();
 }
 
 #[test]
 fn drill_steps_are_read_beside_long_work() {
-    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let _exclusive = EXCLUSIVE.lock().unwrap_or_else(PoisonError::into_inner);
     let (stops, reads) = (scale(4805, 2405), scale(300, 10));
     let (drive, data) = (long_recording(stops), tempfile::tempdir().unwrap());
-    let server = Killable::start(drive.path(), data.path());
+    let server = ServerProcess::start(drive.path(), data.path());
     let traverse = traverse(&server);
     let session = begin(&server, stops - 5);
     until(&server, &format!("sessions/{session}/targets/0/runs/0"), has_ended);
@@ -209,11 +209,11 @@ fn drill_steps_are_read_beside_long_work() {
         assert!(!has_ended(&server.get(&path)), "the long runs went on meanwhile");
     }
     let job = server.get(&format!("studies/jobs/{}", study["id"].as_str().unwrap_or("1")));
-    watched.tell(
+    watched.print_row(
         "steps beside two long runs and a study",
         &format!("p95 {idle:.1} ms alone, {beside:.1} ms beside them"),
     );
-    tell(
+    print_row(
         "a short run beside them",
         &format!(
             "first step after {:.2} s, five after {:.2} s; the study is {}",

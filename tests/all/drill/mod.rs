@@ -1,13 +1,13 @@
-//! Drills: the program itself under load and in trouble, measured from outside.
+//! Drills: the program under load and with faults, measured from outside.
 //!
-//! The tests run each drill on a small scale. `cargo xtask drill` runs them on the whole scale, one after the other, and
-//! shows the lines of its table, which begin with [`MARK`].
+//! The tests run each drill at a small scale. `cargo xtask drill` runs them at full scale, one after the other, and prints
+//! the lines of the table, which begin with [`MARK`].
 
 mod clock;
 mod load;
-mod ending;
+mod shutdown;
 mod kills;
-mod trouble;
+mod storage_faults;
 
 use std::sync::Mutex;
 use std::sync::mpsc::RecvTimeoutError;
@@ -16,43 +16,43 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 use sightline_tests::server::PIXEL;
 
-use crate::keeping::Killable;
+use crate::persistence::ServerProcess;
 
-/// What a line of the table begins with.
+/// Prefix of a line of the table.
 const MARK: &str = "drill |";
 
-/// Idle threads have ended after this.
+/// Time within which idle threads end.
 const IDLE: Duration = Duration::from_secs(20);
 
-/// Drills measure the same machine: one at a time.
-static ONE: Mutex<()> = Mutex::new(());
+/// Drills measure the same machine, so only one runs at a time.
+static EXCLUSIVE: Mutex<()> = Mutex::new(());
 
-/// Whether this is the drill itself, and not the slice of it that the tests contain: only the drill judges times and memory.
-pub(crate) fn is_whole() -> bool {
+/// Whether this is the full drill instead of its short form in the tests; only the full drill checks times and memory.
+pub(crate) fn is_full_scale() -> bool {
     std::env::var_os("SIGHTLINE_DRILL").is_some()
 }
 
-/// The number for the whole scale, or the one for the tests.
+/// Returns the number for full scale or the one for the tests.
 pub(crate) fn scale<T>(whole: T, small: T) -> T {
-    if is_whole() { whole } else { small }
+    if is_full_scale() { whole } else { small }
 }
 
 /// Prints a line of the table.
-pub(crate) fn tell(drill: &str, outcome: &str) {
+pub(crate) fn print_row(drill: &str, outcome: &str) {
     println!("{MARK} {drill:<44} | {outcome}");
 }
 
-/// What a process holds.
+/// Resources in use by a process.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Held {
+pub(crate) struct Resources {
     threads: u64,
     resident_mib: u64,
     descriptors: u64,
 }
 
-impl Held {
-    /// Reads it from the system; zeros where it has no `/proc`.
-    fn by(process: u32) -> Self {
+impl Resources {
+    /// Reads them from `/proc`; zeros where there is none.
+    fn of(process: u32) -> Self {
         let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
         let number = |name: &str| {
             let line = status.lines().find_map(|line| line.strip_prefix(name));
@@ -63,7 +63,7 @@ impl Held {
         Self { threads: number("Threads:"), resident_mib: number("VmRSS:") / 1024, descriptors }
     }
 
-    fn most(self, other: Self) -> Self {
+    fn max(self, other: Self) -> Self {
         Self {
             threads: self.threads.max(other.threads),
             resident_mib: self.resident_mib.max(other.resident_mib),
@@ -72,31 +72,31 @@ impl Held {
     }
 }
 
-/// What may be left of so many threads or descriptors.
-const fn most(before: u64) -> u64 {
+/// The number of threads or descriptors that is accepted after the work.
+const fn accepted_after(before: u64) -> u64 {
     before + before / 5 + 2
 }
 
-/// What a process holds before, at most during, and after some work.
+/// Resources of a process before, at most during, and after some work.
 pub(crate) struct Watched<T> {
     value: T,
-    before: Held,
-    peak: Held,
-    after: Held,
+    before: Resources,
+    peak: Resources,
+    after: Resources,
 }
 
 impl<T> Watched<T> {
-    /// Does some work. Threads, memory and descriptors are read `rest` after it, and again until idle threads have ended.
-    fn of(server: &Killable, rest: Duration, work: impl FnOnce() -> T) -> Self {
+    /// Runs `work`. The resources are read `rest` after it, and again until idle threads have ended.
+    fn of(server: &ServerProcess, rest: Duration, work: impl FnOnce() -> T) -> Self {
         let process = server.id();
-        let before = Held::by(process);
+        let before = Resources::of(process);
         let (value, peak) = std::thread::scope(|scope| {
-            // The sender is dropped when the work ends, also by a panic.
+            // The sender is dropped when the work ends, also in a panic.
             let (working, is_over) = std::sync::mpsc::channel::<()>();
             let watching = scope.spawn(move || {
                 let mut peak = before;
                 while is_over.recv_timeout(Duration::from_millis(50)) == Err(RecvTimeoutError::Timeout) {
-                    peak = peak.most(Held::by(process));
+                    peak = peak.max(Resources::of(process));
                 }
                 peak
             });
@@ -106,38 +106,45 @@ impl<T> Watched<T> {
         });
         std::thread::sleep(rest);
         let begun = Instant::now();
-        let mut after = Held::by(process);
+        let mut after = Resources::of(process);
         // Idle threads end after ten seconds.
-        while after.threads > most(before.threads) && begun.elapsed() < IDLE {
+        while after.threads > accepted_after(before.threads) && begun.elapsed() < IDLE {
             std::thread::sleep(Duration::from_millis(200));
-            after = Held::by(process);
+            after = Resources::of(process);
         }
         Self { value, before, peak, after }
     }
 
-    /// Before → peak → after.
-    fn tell(&self, drill: &str, outcome: &str) {
-        let three = |part: fn(&Held) -> u64| {
+    /// Prints before → peak → after.
+    fn print_row(&self, drill: &str, outcome: &str) {
+        let three = |part: fn(&Resources) -> u64| {
             format!("{} → {} → {}", part(&self.before), part(&self.peak), part(&self.after))
         };
-        let [threads, memory, files] =
-            [three(|held| held.threads), three(|held| held.resident_mib), three(|held| held.descriptors)];
-        tell(drill, &format!("{outcome}; threads {threads}, MiB {memory}, descriptors {files}"));
+        let [threads, memory, files] = [
+            three(|resources| resources.threads),
+            three(|resources| resources.resident_mib),
+            three(|resources| resources.descriptors),
+        ];
+        print_row(drill, &format!("{outcome}; threads {threads}, MiB {memory}, descriptors {files}"));
     }
 
-    /// Asserts that nothing of the work is left: its threads and connections are gone.
-    fn assert_given_back(&self) {
-        assert!(self.after.threads <= most(self.before.threads), "threads: {} after", self.after.threads);
+    /// Asserts that threads, connections and memory of the work are released.
+    fn assert_released(&self) {
+        assert!(
+            self.after.threads <= accepted_after(self.before.threads),
+            "threads: {} after",
+            self.after.threads
+        );
         let [before, after] = [self.before.descriptors, self.after.descriptors];
-        assert!(after <= most(before), "descriptors: {before} before, {after} after");
-        // On a small scale, what is made once and kept is most of the memory.
+        assert!(after <= accepted_after(before), "descriptors: {before} before, {after} after");
+        // At a small scale, allocations that are made once dominate the memory.
         let [before, after] = [self.before.resident_mib, self.after.resident_mib];
-        assert!(!is_whole() || after <= before + before / 5, "MiB: {before} before, {after} after");
+        assert!(!is_full_scale() || after <= before + before / 5, "MiB: {before} before, {after} after");
     }
 }
 
-/// Begins a session with a target at the rock, seen from a step; its name.
-pub(crate) fn begin(server: &Killable, step: usize) -> String {
+/// Begins a session with a target on the rock, designated at `step`; returns its name.
+pub(crate) fn begin(server: &ServerProcess, step: usize) -> String {
     let traverse = server.get("traverses")[0]["id"].clone();
     let session = server.json("POST", "sessions", &json!({ "traverse": traverse }));
     let name = session["id"].as_str().unwrap().to_owned();
@@ -147,8 +154,8 @@ pub(crate) fn begin(server: &Killable, step: usize) -> String {
     name
 }
 
-/// Waits until a value at a path is as wanted; returns the whole answer.
-pub(crate) fn until(server: &Killable, path: &str, is_so: impl Fn(&Value) -> bool) -> Value {
+/// Polls a path until `is_so` is true; returns the whole response.
+pub(crate) fn until(server: &ServerProcess, path: &str, is_so: impl Fn(&Value) -> bool) -> Value {
     let begun = std::time::Instant::now();
     loop {
         let answer = server.get(path);

@@ -1,4 +1,4 @@
-//! The corners of visual odometry and the slip in a recording of a drive whose motion was measured.
+//! The corners of visual odometry and the slip in the recording of a drive with visual odometry.
 
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;

@@ -1,4 +1,4 @@
-//! The entities of the shape tracker, from arrays made up for the short drive.
+//! The entities of the shape tracker, from synthetic arrays for the short drive.
 
 use std::sync::Arc;
 
@@ -14,13 +14,13 @@ use sightline_vision::registration::Method;
 
 use super::{FIXTURE, MISSING, exported_as_promised};
 
-/// A square of values that grow by one from pixel to pixel; the first does not exist.
+/// A square of values that increase by one from pixel to pixel; the first value is missing.
 fn picture(columns: u32, first: f32) -> Table {
     let values = (0..columns * columns).map(|i| if i == 0 { f32::NAN } else { first + i as f32 });
     Table { columns, values: values.collect() }
 }
 
-/// Whatever the surfaces give a registration.
+/// The values of a registration, independent of the surfaces.
 fn registered() -> Registered {
     let check = |name: &str, value: f64, limit: f64| {
         gate_kinds().into_iter().find(|kind| kind.name == name).unwrap().judge(Some(value), limit)
@@ -56,7 +56,7 @@ fn registered() -> Registered {
     }
 }
 
-/// A surface of two by two pixels, registered with a sensor of four by four and found again at a hand-off.
+/// A surface of two by two pixels, registered with a sensor of four by four and matched at a hand-off.
 fn by_shape(trace: &RunStep) -> RunStep {
     let mut trace = trace.clone();
     let (is_pick, Some(located)) = (trace.prediction().is_none(), trace.located_mut()) else { return trace };
@@ -86,7 +86,7 @@ fn by_shape(trace: &RunStep) -> RunStep {
 }
 
 #[test]
-fn a_run_by_shape_has_its_surface_errors_search_meshes_and_hand_off() {
+fn a_shape_run_logs_depth_errors_search_and_meshes() {
     let steps: Vec<_> = FIXTURE.runs[0].iter().map(|trace| Arc::new(by_shape(trace))).collect();
     let recording = exported_as_promised(&steps);
     let step = 1;
@@ -94,7 +94,7 @@ fn a_run_by_shape_has_its_surface_errors_search_meshes_and_hand_off() {
         let entity = &recording.entities[&format!("/target_1/locate/{entity}")];
         entity.numbers[&(component.to_owned(), step)].clone()
     };
-    // A step of the search is a pixel of the sensor: 10 cm. The middle of its three pixels is no shift.
+    // A step of the search is a pixel of the sensor: 10 cm. The centre of its three pixels is zero shift.
     assert_eq!(numbers("coarse_register/coarse_search/best", "Points2D:positions"), [2.5, 0.5]);
     assert_eq!(numbers("refine_register/mesh_fixed", "Mesh3D:vertex_positions").len(), 3 * 3);
     assert_eq!(numbers("refine_register/misfit", "Scalars:scalars"), [1.25]);
@@ -103,7 +103,7 @@ fn a_run_by_shape_has_its_surface_errors_search_meshes_and_hand_off() {
     let corner = FIXTURE.drive.traverse.site_from_rover(1) * Point3::new(4.0, 0.1, 0.0);
     let second = &numbers("refine_register/mesh_moving", "Mesh3D:vertex_positions")[3..6];
     assert!(second.iter().zip(corner.iter()).all(|(a, b)| (a - b).abs() < 1e-5), "{second:?} {corner}");
-    // The first step has its surface and nothing to be registered to; a step without images has neither.
+    // The first step has its surface and no registration; a step without images has neither.
     let surface = &recording.entities["/target_1/locate/surface/ranges"];
     assert!(surface.data.contains(&0) && surface.cleared.contains(&(MISSING as i64)));
     assert!(recording.entities["/target_1/locate/refine_register/mesh_fixed"].cleared.contains(&0));

@@ -1,8 +1,8 @@
-//! Finds the recorded data sets, which the repository does not contain, for the tests of every crate.
+//! Finds the recorded data sets, which are not in the repository, for the tests of every crate.
 //!
-//! `$SIGHTLINE_DATA` is their folder; without it, `../shared/data` beside the workspace. A test whose data are
-//! missing returns early. It is noted in the file `$SIGHTLINE_LEFT_OUT`, one line per test, from which
-//! `cargo xtask test` lists the tests that were left out and subtracts them from those that passed.
+//! `$SIGHTLINE_DATA` is their folder; by default `../shared/data` beside the workspace. A test whose data are missing
+//! returns early. It is recorded in the file `$SIGHTLINE_LEFT_OUT`, one line per test, from which `cargo xtask test` lists
+//! the skipped tests and subtracts them from those that passed.
 
 use std::fs::OpenOptions;
 use std::io::Write;
@@ -16,7 +16,7 @@ const LEFT_OUT: &str = "SIGHTLINE_LEFT_OUT";
 
 /// Returns the file or folder `name` of the data sets, or `None` if it is missing.
 ///
-/// `None` notes the calling test as left out; `purpose` says in the test's output what was not compared.
+/// `None` records the calling test as skipped; `purpose` states in the test's output what was not compared.
 pub fn recorded(name: &str, purpose: &str) -> Option<PathBuf> {
     let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     let path = std::env::var_os(FOLDER).map_or_else(beside, PathBuf::from).join(name);

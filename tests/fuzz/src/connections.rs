@@ -1,4 +1,4 @@
-//! The connection itself: any bytes in place of requests, and any frames on a WebSocket.
+//! The connection itself: arbitrary bytes instead of requests, and arbitrary frames on a WebSocket.
 
 use std::cell::RefCell;
 use std::time::Duration;
@@ -7,18 +7,18 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream};
 
 use crate::server::{LEFT_OUT, PORT, Server, TOKEN};
 
-/// Connections to one server, so that what it keeps stays small.
+/// Connections per server, which limits its stored data.
 const CONNECTIONS_EACH: usize = 500;
-/// The longest wait for the end of a connection whose client has ended its side. The search has a limit of its own.
+/// Maximum wait for the end of a connection whose client has closed its side. The search has a limit of its own.
 const PATIENCE: Duration = Duration::from_secs(60);
-/// The most bytes of an answer that are read.
+/// Maximum number of bytes that are read of a response.
 const ANSWER_BYTES: u64 = 16 << 20;
-/// The most bytes of a structured frame, which a length byte gives.
+/// Maximum payload of a structured frame, whose length is one byte.
 const PAYLOAD_BYTES: usize = 255;
 /// The mask of frames, any four bytes.
 const MASK: [u8; 4] = [0x37, 0xfa, 0x21, 0x3d];
 
-/// Bytes on a fresh connection to a server that asks for an access token.
+/// Bytes on a new connection to a server that requires an access token.
 ///
 /// Without the token in the bytes, no answer contains the name of the recording.
 pub(crate) fn http(bytes: &[u8]) {
@@ -43,8 +43,8 @@ pub(crate) fn http(bytes: &[u8]) {
 
 /// Frames on the WebSocket of events, after a proper handshake.
 ///
-/// A first byte of 0: the other bytes are sent as they are. Else frames follow, each a first byte of its own, a length and so
-/// many bytes, which are sent masked, as a client must.
+/// If the first byte is 0, the other bytes are sent unchanged. Otherwise frames follow: a first byte, a length and that many
+/// payload bytes each. They are sent masked, as required of a client.
 pub(crate) fn websocket(bytes: &[u8]) {
     let sent = match bytes.split_first() {
         None => return,
@@ -59,7 +59,7 @@ pub(crate) fn websocket(bytes: &[u8]) {
         server.runtime.block_on(async {
             let mut stream = server.connect().await;
             stream.write_all(request.as_bytes()).await.expect("the server reads");
-            // The client may end its side only after the handshake: before, that would end the connection.
+            // The client may close its side only after the handshake; earlier, that would end the connection.
             let mut head = Vec::new();
             while !head.ends_with(b"\r\n\r\n") {
                 head.push(stream.read_u8().await.expect("the server answers"));
@@ -91,12 +91,12 @@ fn framed(mut frames: &[u8]) -> Vec<u8> {
     sent
 }
 
-/// Sends the bytes, ends the client's side and reads until the server ends its own.
+/// Sends the bytes, closes the client's side and reads until the server closes its own.
 async fn exchange(stream: DuplexStream, bytes: &[u8]) -> Vec<u8> {
     let (reader, mut writer) = tokio::io::split(stream);
     let mut answer = Vec::new();
     let write = async {
-        // The server may close the connection before it has read everything.
+        // The server may close the connection before it has read all bytes.
         let _ = writer.write_all(bytes).await;
         let _ = writer.shutdown().await;
     };
@@ -109,7 +109,7 @@ async fn exchange(stream: DuplexStream, bytes: &[u8]) -> Vec<u8> {
     answer
 }
 
-/// Gives a server of this thread to `use_it`; a fresh one after some connections.
+/// Passes a server of this thread to `use_it`; it is replaced after [`CONNECTIONS_EACH`] connections.
 fn with_server(is_locked: bool, use_it: impl FnOnce(&Server)) {
     thread_local! {
         static SERVERS: RefCell<[Option<(Server, usize)>; 2]> = const { RefCell::new([None, None]) };

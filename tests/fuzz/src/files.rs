@@ -9,7 +9,7 @@ use sightline_vision::image::{io, npz};
 
 use crate::recording;
 
-/// The most pixels of a picture that is decoded here: the parsers allow more than the fuzzer's memory.
+/// Maximum number of pixels that are decoded here: the parsers permit more than the fuzzer's memory.
 const PIXELS_MAX: u64 = 1 << 20;
 
 /// A product with its label, camera, pose and pixels.
@@ -17,7 +17,7 @@ pub(crate) fn pds3(bytes: &[u8]) {
     with_file("product.img", bytes, |path| {
         is_product(path);
         let Ok(product) = Product::read(path) else { return };
-        // Each part may be refused by itself.
+        // Each part may be refused.
         let _ = (product.id(), product.instrument().to_owned(), product.light());
         let _ = (product.camera(), product.site_from_rover());
         let is_small =
@@ -42,12 +42,12 @@ pub(crate) fn kitti_poses(bytes: &[u8]) {
     });
 }
 
-/// An index as a person writes it.
+/// An index in TOML.
 pub(crate) fn index_toml(bytes: &[u8]) {
     index("traverse.toml", bytes);
 }
 
-/// An index as a program writes it.
+/// An index in JSON.
 pub(crate) fn index_json(bytes: &[u8]) {
     index("traverse.json", bytes);
 }
@@ -57,7 +57,7 @@ fn index(name: &str, bytes: &[u8]) {
         if let Ok(traverse) = Traverse::open(path) {
             let _ = traverse.warnings();
             for step in 0..traverse.stop_count().min(4) {
-                // The images are not there.
+                // The images do not exist.
                 assert!(traverse.capture(step).is_err());
             }
         }
@@ -71,7 +71,7 @@ pub(crate) fn png(bytes: &[u8]) {
         if u64::from(width) * u64::from(height) <= PIXELS_MAX {
             let _ = io::read_png_of_size(path, Some(4095.0), [width, height]);
         }
-        // One of more pixels than wanted is refused by its header.
+        // An image with too many pixels is refused by its header.
         let is_larger = u64::from(width) * u64::from(height) > 1;
         assert!(!is_larger || io::read_png_of_size(path, None, [1, 1]).is_err());
     });
@@ -82,7 +82,7 @@ pub(crate) fn npz(bytes: &[u8]) {
     let _ = npz::decode(bytes, "arrays.npz");
 }
 
-/// Gives a parser a file with these bytes.
+/// Passes the path of a file with these bytes to a parser.
 fn with_file(name: &str, bytes: &[u8], read: impl FnOnce(&Path)) {
     let path = recording::scratch().join(name);
     std::fs::write(&path, bytes).expect("the scratch folder can be written");

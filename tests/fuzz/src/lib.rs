@@ -1,7 +1,7 @@
-//! The parsers of foreign bytes, each as a function that takes any bytes: a file of an import, a request, a stored record.
+//! The parsers of foreign bytes, each as a function of arbitrary bytes: a file of an import, a request, a stored record.
 //!
-//! A parser may refuse its input; it must not panic, take seconds or hundreds of megabytes. `cargo xtask fuzz` searches for
-//! inputs that make it do so, guided by the coverage of the workspace's own crates. The inputs under `corpus/` are the
+//! A parser may refuse its input; it must not panic, nor take seconds or hundreds of megabytes. `cargo xtask fuzz` searches
+//! for inputs that violate this, guided by the coverage of the workspace's own crates. The inputs under `corpus/` are the
 //! seeds of the search and the inputs that once failed; the tests replay them, with seeded changes.
 
 mod files;
@@ -16,9 +16,9 @@ mod replay;
 
 /// A parser of foreign bytes.
 pub struct Target {
-    /// Its name, which is also that of its folder of inputs.
+    /// Its name, which is also the name of its folder of inputs.
     pub name: &'static str,
-    /// The function: it returns for every input.
+    /// The function; it must return for every input.
     pub parse: fn(&[u8]),
 }
 
@@ -43,7 +43,7 @@ pub const TARGETS: &[Target] = &[
     Target { name: "websocket", parse: connections::websocket },
 ];
 
-/// The parser of this name.
+/// The parser with this name.
 pub fn target(name: &str) -> Option<&'static Target> {
     TARGETS.iter().find(|target| target.name == name)
 }

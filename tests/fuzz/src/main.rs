@@ -11,7 +11,7 @@ libfuzzer_sys::fuzz_target!(init: catch_panics(), |bytes: &[u8]| {
     (CHOSEN.get_or_init(chosen).parse)(bytes);
 });
 
-/// Lets panics of the database unwind: the engine's own hook ends the process for every one, but the program catches these.
+/// Lets panics of the database unwind: libFuzzer's panic hook aborts the process, but the program catches these panics.
 fn catch_panics() {
     if chosen().name == "store" {
         drop(std::panic::take_hook());

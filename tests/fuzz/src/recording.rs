@@ -1,4 +1,4 @@
-//! A recording of three small stops, and the folder in which parsers find their files.
+//! A recording of three small stops, and the folder for the files of parsers.
 
 use std::path::Path;
 use std::sync::OnceLock;
@@ -16,10 +16,10 @@ use tempfile::TempDir;
 const SIZE: [u32; 2] = [96, 64];
 /// Focal length, px.
 const FOCAL_PX: f64 = 80.0;
-/// Distance of the cameras, m.
+/// Baseline of the cameras, m.
 const BASELINE_M: f64 = 0.2;
 
-/// A folder for files that live as long as one input; in memory, if the system has such a place.
+/// A folder for files that exist during one input; in memory if the system has such a file system.
 pub(crate) fn scratch() -> &'static Path {
     thread_local! {
         static FOLDER: &'static Path = Box::leak(Box::new(folder())).path();
@@ -27,7 +27,7 @@ pub(crate) fn scratch() -> &'static Path {
     FOLDER.with(|path| *path)
 }
 
-/// A folder that is removed with its value.
+/// A folder that is removed when it is dropped.
 pub(crate) fn folder() -> TempDir {
     let in_memory = Path::new("/dev/shm");
     let made = if in_memory.is_dir() { tempfile::tempdir_in(in_memory) } else { tempfile::tempdir() };

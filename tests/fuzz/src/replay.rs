@@ -1,17 +1,17 @@
-//! Replays the inputs under `corpus/`, each as it is and with seeded changes.
+//! Replays the inputs under `corpus/`, unchanged and with seeded changes.
 
 use std::path::{Path, PathBuf};
 
 use super::{TARGETS, Target};
 
-/// Inputs that are replayed for each parser.
+/// Number of inputs that are replayed for each parser.
 const INPUTS: usize = 1500;
-/// Parsers behind a whole server.
+/// Parsers that need a whole server.
 const SERVED: [&str; 4] = ["requests", "http", "websocket", "store"];
-/// Inputs that are replayed for each of these.
+/// Number of inputs that are replayed for each of [`SERVED`].
 const SERVED_INPUTS: usize = 400;
 
-/// A small generator with a seed (xorshift64*).
+/// A small seeded generator (xorshift64*).
 struct Random(u64);
 
 impl Random {
@@ -32,7 +32,7 @@ fn corpus(target: &Target) -> Vec<Vec<u8>> {
     files.iter().map(|file| std::fs::read(file).expect("an input")).collect()
 }
 
-/// One to four changes: a byte replaced, a piece removed, repeated, or taken from another input.
+/// One to four changes: a byte replaced, or a piece removed, repeated, or copied from another input.
 fn changed(input: &[u8], other: &[u8], random: &mut Random) -> Vec<u8> {
     const TOKENS: [&[u8]; 10] =
         [b"-1", b"0", b"1e308", b"nan", b"99999999999999999999", b"\"", b"{", b"]", b"\xff\xfe", b"\0"];

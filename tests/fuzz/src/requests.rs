@@ -1,10 +1,10 @@
-//! The interface: requests with any query and any body, to a server in this process.
+//! The REST interface: requests with arbitrary query and body, to a server in this process.
 
 use std::cell::RefCell;
 
 use crate::server::{LEFT_OUT, Server};
 
-/// Requests that one server answers, so that what it keeps stays small.
+/// Requests per server, which limits its stored data.
 const REQUESTS_EACH: usize = 500;
 
 /// A request: method and path in the first line, such as `POST /sessions/s1/notes`; the other bytes are its body.

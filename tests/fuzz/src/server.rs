@@ -16,12 +16,12 @@ use crate::recording;
 
 /// The port in the server's own address.
 pub(crate) const PORT: u16 = 7700;
-/// The access token of a server that asks for one.
+/// The access token of a server that requires one.
 pub(crate) const TOKEN: &str = "a-token-of-the-tests";
-/// Ends of paths that start long work, open ports or send events without an end.
+/// Ends of paths that start long computations, open ports or send events without an end.
 pub(crate) const LEFT_OUT: [&str; 6] =
     ["/traverses", "/reproduced", "/studies/jobs", "/resume", "/rerun", "/events"];
-/// Bytes on their way between the server and a client, each way.
+/// Capacity of the pipe between the server and a client, in each direction, bytes.
 const PIPE_BYTES: usize = 64 << 10;
 /// Connections that wait to be accepted.
 const WAITING: usize = 4;
@@ -37,7 +37,7 @@ pub(crate) struct Server {
 }
 
 impl Server {
-    /// A server; it asks for [`TOKEN`] if `is_locked`.
+    /// Starts a server; it requires [`TOKEN`] if `is_locked`.
     pub(crate) fn start(is_locked: bool) -> Self {
         let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build();
         let runtime = runtime.expect("a runtime");
@@ -64,7 +64,7 @@ impl Server {
         server
     }
 
-    /// The status of the answer, which is read to its end; `None` for a path that no URL has.
+    /// Returns the status of the response, which is read to its end; `None` if the path is not a valid URL.
     pub(crate) fn send(&self, method: &str, path: &str, body: &[u8]) -> Option<u16> {
         let request = Request::builder()
             .method(method)
@@ -82,18 +82,18 @@ impl Server {
         }))
     }
 
-    /// Ends the server when its work is done; its folder.
+    /// Ends the server when its work is done; returns its folder.
     pub(crate) fn end(self) -> TempDir {
         let Self { folder, .. } = self;
         folder
     }
 
-    /// Leaves the server without waiting for its work on blocking threads, which nobody cancels here.
+    /// Drops the server without waiting for its work on blocking threads, which is not cancelled here.
     pub(crate) fn leave(self) {
         self.runtime.shutdown_background();
     }
 
-    /// A new connection to the server.
+    /// Opens a new connection to the server.
     pub(crate) async fn connect(&self) -> DuplexStream {
         let (ours, theirs) = tokio::io::duplex(PIPE_BYTES);
         self.connections.send(theirs).await.expect("the server accepts connections");
@@ -111,7 +111,7 @@ impl axum::serve::Listener for Pipes {
     async fn accept(&mut self) -> (DuplexStream, ()) {
         match self.0.recv().await {
             Some(stream) => (stream, ()),
-            // The other end is gone with its server.
+            // The other end was dropped with its server.
             None => std::future::pending().await,
         }
     }

@@ -1,4 +1,4 @@
-//! The database of sessions with any bytes of its file changed.
+//! The database of sessions, with arbitrary changes to the bytes of its file.
 
 use std::path::Path;
 use std::sync::OnceLock;
@@ -15,11 +15,11 @@ use crate::server::{PORT, Server};
 
 /// The file in the folder of sessions.
 const FILE: &str = "sessions.redb";
-/// The length of a change that stands for the end of the file at its offset.
+/// A change of this length truncates the file at its offset.
 const CUT: u8 = 255;
 
-/// Changes of a whole database with a session, a target and its run: each has an offset of three bytes, a length byte and so
-/// many bytes; the offset wraps at the file's length.
+/// Changes a complete database with a session, a target and its run: each change has an offset of three bytes, a length byte
+/// and that many bytes; the offset is taken modulo the length of the file.
 ///
 /// Whatever is changed, the server starts and lists its sessions.
 pub(crate) fn store(bytes: &[u8]) {
@@ -40,7 +40,7 @@ pub(crate) fn store(bytes: &[u8]) {
     assert_eq!(status, 200);
 }
 
-/// The file of a server that has ended.
+/// The database file of a server that has ended.
 fn whole() -> &'static [u8] {
     static WHOLE: OnceLock<Vec<u8>> = OnceLock::new();
     WHOLE.get_or_init(|| {

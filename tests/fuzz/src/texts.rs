@@ -14,7 +14,7 @@ use sightline_session::view::SavedSession;
 use sightline_track::settings::{Changes, Settings};
 use sightline_world::Scenario;
 
-/// A camera in JPL's text form. A camera that is read is written and read again.
+/// A camera in JPL's text form. A camera that was read is written and read again.
 pub(crate) fn camera(bytes: &[u8]) {
     let Ok(camera) = text::read_text(&String::from_utf8_lossy(bytes), Path::new("left.cahvor")) else {
         return;
@@ -24,7 +24,7 @@ pub(crate) fn camera(bytes: &[u8]) {
     let _ = camera.ray(Pixel::new(3.0, 4.0)).and_then(|ray| camera.project(&ray.at(5.0)));
 }
 
-/// A scenario. One that is read is written and read again.
+/// A scenario. One that was read is written and read again.
 pub(crate) fn scenario(bytes: &[u8]) {
     let Ok(scenario) = Scenario::from_toml(&String::from_utf8_lossy(bytes), Path::new("scenario.toml"))
     else {
@@ -34,7 +34,7 @@ pub(crate) fn scenario(bytes: &[u8]) {
     assert_eq!(again.ok().as_ref(), Some(&scenario));
 }
 
-/// An expression, and its completion at every place.
+/// An expression, and its completion at every position.
 pub(crate) fn expression(bytes: &[u8]) {
     let text = String::from_utf8_lossy(bytes);
     let _ = (Expression::read(&text), Expression::condition(&text), Expression::column(&text));
@@ -43,7 +43,7 @@ pub(crate) fn expression(bytes: &[u8]) {
     }
 }
 
-/// A session as the store keeps it. One that is restored is saved and restored again.
+/// A session in the form of the store. One that was restored is saved and restored again.
 pub(crate) fn stored_session(bytes: &[u8]) {
     let Ok(saved) = serde_json::from_slice::<SavedSession>(bytes) else { return };
     let Ok(mut session) = Session::restored(&saved, 5) else { return };

@@ -77,7 +77,7 @@ fn title(
         ui.label(theme::note(format!("{}{unit}", derived.expression)).color(theme::text()));
         let words = match (&derived.problem, of_run) {
             (Some(problem), _) => problem.clone(),
-            (None, None) if derived.answer.is_none() => "being asked …".to_owned(),
+            (None, None) if derived.answer.is_none() => "loading …".to_owned(),
             (None, None) => "not defined for this run: the expression compares other runs".to_owned(),
             (None, Some(_)) => match value_at(of_run, state.cursor.step) {
                 Some(value) => digits(value),
@@ -87,7 +87,7 @@ fn title(
         ui.label(theme::note(words));
         let remove = ui.small_button(RichText::new("x").monospace());
         let remove = remove.accessible_name(format!("remove plot {}", derived.expression));
-        if remove.on_hover_text("take this plot away").clicked() {
+        if remove.on_hover_text("remove this plot").clicked() {
             out.push(Command::Breakpoints(BreakpointCommand::Unplot(at)));
         }
     });

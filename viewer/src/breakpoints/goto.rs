@@ -45,7 +45,7 @@ impl State {
     fn step_at_time(&self, text: &str) -> Result<usize, String> {
         let number = text.trim().trim_end_matches('s').trim();
         let time_s: f64 =
-            number.parse().map_err(|_| format!("`{number}` is no time in seconds, as in t=3.5."))?;
+            number.parse().map_err(|_| format!("`{number}` is not a time in seconds, as in t=3.5."))?;
         let stops = self.traverse.as_ref().map(|traverse| traverse.stops.as_slice()).unwrap_or_default();
         let gap = |step: &usize| (stops[*step].time_s - time_s).abs();
         let nearest = (0..stops.len()).min_by(|a, b| gap(a).total_cmp(&gap(b)));
@@ -90,5 +90,5 @@ impl State {
 }
 
 fn not_a_step(text: &str) -> String {
-    if text.is_empty() { format!("Type {FORMS}.") } else { format!("`{text}` is no step: type {FORMS}.") }
+    if text.is_empty() { format!("Type {FORMS}.") } else { format!("`{text}` is not a step: type {FORMS}.") }
 }

@@ -15,7 +15,7 @@ impl State {
     pub(crate) fn apply_breakpoint_command(&mut self, command: BreakpointCommand) {
         match command {
             BreakpointCommand::Type(text) => {
-                (self.breakpoints.text, self.breakpoints.wants_focus) = (text, false)
+                (self.breakpoints.text, self.breakpoints.wants_focus) = (text, false);
             }
             BreakpointCommand::Focus => {
                 self.breakpoints.wants_focus = true;

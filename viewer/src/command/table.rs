@@ -180,7 +180,7 @@ pub(crate) static TABLE: &[HelpLine] = &[
     gesture(Page, "Enter  Backspace  Esc", "in the tour: next, back, skip"),
     line(
         Target,
-        "run from this step with the changed settings, or as a branch with what is tried",
+        "run from this step with the changed settings, or as a branch with the tried values",
         &[Do::new("Run from this step with the changed settings", &[On::plain(Key::R)], run_or_branch)],
     ),
     line(

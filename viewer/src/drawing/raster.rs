@@ -18,7 +18,7 @@ const SIDE_MAX: u32 = 8192;
 
 /// The colour map of an array.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ColourMap {
+pub(crate) enum ColourMap {
     /// Viridis, from the first value to the second.
     Values([f32; 2]),
     /// Blue–white–red, from minus the value to the value.
@@ -27,7 +27,7 @@ pub enum ColourMap {
 
 impl ColourMap {
     /// The colour of a value; transparent if it is NaN.
-    pub fn colour(self, value: f32) -> Color32 {
+    pub(crate) fn colour(self, value: f32) -> Color32 {
         match self {
             Self::Values([low, high]) => theme::score((value - low) / (high - low).max(f32::MIN_POSITIVE)),
             Self::Signed(limit) => theme::signed(value, limit.max(f32::MIN_POSITIVE)),
@@ -35,7 +35,7 @@ impl ColourMap {
     }
 
     /// The values at the ends of the colour map.
-    pub fn limits(self) -> [f32; 2] {
+    pub(crate) fn limits(self) -> [f32; 2] {
         match self {
             Self::Values(limits) => limits,
             Self::Signed(limit) => [-limit, limit],
@@ -134,7 +134,7 @@ impl Raster {
     }
 
     /// Applies a colour map to the texture of an array, unless it is already applied.
-    pub fn set_colour_map(&self, colour_map: ColourMap) {
+    pub(crate) fn set_colour_map(&self, colour_map: ColourMap) {
         let mut present = self.colour_map.lock();
         if *present == Some(colour_map) {
             return;

@@ -113,7 +113,7 @@ fn word(kind: FaultKind) -> &'static str {
 fn effect(kind: FaultKind) -> &'static str {
     match kind {
         FaultKind::Occluder => {
-            "A block of 0.6 m stands before the target, a third of the way from the camera"
+            "A block of 0.6 m is in front of the target, a third of the way from the camera"
         }
         FaultKind::Shadow => "The shadow of a block of 0.8 m falls on the target",
         FaultKind::FeatureStarvation => "Dust takes 95 % of the contrast of every image",

@@ -318,7 +318,7 @@ fn buttons(ui: &mut Ui, state: &State, drive: &DriveView, out: &mut Vec<Command>
         button(
             &branch,
             true,
-            "Drives from the stop that is looked at, in a world and a session of its own",
+            "Drives from the selected stop, in a world and a session of its own",
             DrivingCommand::Begin,
         );
     });

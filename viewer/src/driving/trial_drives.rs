@@ -198,7 +198,7 @@ pub(super) fn show(ui: &mut Ui, state: &State, change: &DecisionChange, out: &mu
     };
     if let Some(session) = &trial.session {
         let name = format!("open the drive with {}", change.text);
-        let help = "Opens the session of this drive; the present one stays in the list";
+        let help = "Opens the session of this drive; the current one stays in the list";
         if ui.small_button("Open").accessible_name(name).on_hover_text(help).clicked() {
             out.push(Command::Files(files::FilesCommand::Resume(session.clone())));
         }

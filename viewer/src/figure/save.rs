@@ -75,7 +75,7 @@ pub(crate) fn take(
     let mut sentence = format!("Saved {name}: {size}, {} kB.", bytes.len().div_ceil(1000));
     if place.is_none() {
         sentence += &format!(
-            " {} is not on the screen: it was drawn apart, with what is loaded.",
+            " {} is not on the screen: it was drawn separately, with the loaded data.",
             request.pane.title()
         );
     }

@@ -99,7 +99,7 @@ impl State {
                 self.remove_upload();
             }
             RecordingCommand::Choose { is_archive } => {
-                self.outbox.add(Effect::ChooseRecording { is_archive })
+                self.outbox.add(Effect::ChooseRecording { is_archive });
             }
             RecordingCommand::StopSending => {
                 self.files.recordings.sending = None;

@@ -164,7 +164,7 @@ impl State {
         let wanted = Settings::default().with(changes).ok();
         let Some(draft) = wanted.and_then(|wanted| self.changes_to_settings(&wanted)) else {
             let words = format!(
-                "{file} is a tracker configuration, but no run is looked at that it could change: pick a target (T), then drop it again."
+                "{file} is a tracker configuration, but no run is selected that it could change: pick a target (T), then drop it again."
             );
             self.messages.refused_file(words);
             return;

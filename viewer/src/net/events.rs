@@ -77,7 +77,7 @@ impl Events {
                 WsEvent::Opened => (self.is_open, self.attempts) = (true, 0),
                 // Events of unknown kinds are for newer versions of the page.
                 WsEvent::Message(WsMessage::Text(text)) => {
-                    events.extend(serde_json::from_str::<Event>(&text))
+                    events.extend(serde_json::from_str::<Event>(&text));
                 }
                 WsEvent::Message(_) => {}
                 WsEvent::Error(_) | WsEvent::Closed => is_lost = true,

@@ -118,7 +118,7 @@ impl Messages {
     }
 
     /// Adds a note that offers to undo a change.
-    pub fn note_with_undo(&mut self, text: impl Into<String>, change: u64) {
+    pub(crate) fn note_with_undo(&mut self, text: impl Into<String>, change: u64) {
         self.add(Weight::Note, text.into(), None, None);
         if let Some(last) = self.list.last_mut() {
             last.change = Some(change);

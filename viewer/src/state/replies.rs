@@ -69,7 +69,7 @@ impl State {
             Event::RenderProgress { traverse, k, n, ready } => self.rendered(&traverse, k, n, ready),
             Event::StudyProgress { job } => self.update_study(job),
             Event::TrackabilityProgress { traverse, step, .. } => {
-                self.on_trackability_progress(&traverse, step)
+                self.on_trackability_progress(&traverse, step);
             }
             Event::QuestionProgress { session, target, run, step, .. } => {
                 self.on_question_progress(StepKey { session, target, run, step });

@@ -145,17 +145,17 @@ impl State {
             }
             UndoableChange::RemovedRun { target, run } => self.show_run(*target, *run, !again, None),
             UndoableChange::RemovedBreakpoint { expression, .. } if again => {
-                self.remove_by_condition(expression)
+                self.remove_by_condition(expression);
             }
             UndoableChange::RemovedBreakpoint { expression, is_on } => {
-                self.restore_breakpoint(expression, *is_on)
+                self.restore_breakpoint(expression, *is_on);
             }
             UndoableChange::RemovedPlot { expression, .. } if again => self.remove_plot(expression),
             UndoableChange::RemovedPlot { expression, place } => self.restore_plot(expression, *place),
             UndoableChange::RemovedNote { id, .. } if again => self.remove_note(*id, false),
             UndoableChange::RemovedNote { id, .. } => self.restore_note(*id),
             UndoableChange::Drafted { before, after } => {
-                self.draft = if again { after } else { before }.clone()
+                self.draft = if again { after } else { before }.clone();
             }
             UndoableChange::Tried { of, before, after } => {
                 let what_if = if again { after } else { before }.clone();

@@ -94,5 +94,5 @@ fn the_budget_of_the_test_beds_navcam_is_that_of_the_paper() {
 
 #[test]
 fn the_budget_says_what_it_lacks() {
-    Shown::pane(Pane::Budget, |_| fixture::without_target()).says("The present cameras are known once");
+    Shown::pane(Pane::Budget, |_| fixture::without_target()).says("The current cameras are known once");
 }

@@ -161,7 +161,7 @@ fn a_screen_reader_finds_a_table_with_head_rows_and_cells_and_a_step_leads_there
     let columns = count(Role::ColumnHeader);
     assert!(columns >= 6, "{columns}");
     assert_eq!(count(Role::Cell), (columns - 1) * (fixture::STOPS - 1), "the step itself is a button");
-    shown.harness.get_by_role_and_label(Role::Row, "step 2, the present one");
+    shown.harness.get_by_role_and_label(Role::Row, "step 2, the current one");
     shown.harness.get_by_role_and_label(Role::ColumnHeader, "pixel error, px");
     assert_eq!(shown.click("go to step 4"), vec![Command::Go(Go::Step(4))]);
 }

@@ -1,8 +1,8 @@
-//! Which sources are tests, and where the modules of a source lie.
+//! Identifies test sources, and the folders of a source's modules.
 
 use std::path::{Path, PathBuf};
 
-/// True for a file whose name or folder says that it has tests.
+/// True for a file whose name or folder identifies it as a test.
 pub(super) fn is_of_tests(file: &Path) -> bool {
     let is_folder = file.components().any(|part| part.as_os_str() == "tests");
     is_folder || file.file_stem().is_some_and(|name| name.to_string_lossy().ends_with("tests"))

@@ -1,6 +1,6 @@
-//! Tells texts for users from keys, scripts and formats; reads the texts of a page, and finds numbers of requirements.
+//! Separates user-visible texts from keys, scripts and formats; extracts the texts of a page, and finds requirement numbers.
 
-/// Parts of literals that a program reads: scripts, shaders, styles, drawings, HTTP headers and schemas.
+/// Substrings of literals for programs: scripts, shaders, styles, drawings, HTTP headers and schemas.
 const OF_PROGRAMS: [&str; 13] = [
     " => ",
     "#version",
@@ -17,7 +17,7 @@ const OF_PROGRAMS: [&str; 13] = [
     "self'",
 ];
 
-/// True for words, false for keys, identifiers, paths, scripts, markup and formats without words.
+/// True for words; false for keys, identifiers, paths, scripts, markup and formats without words.
 pub(super) fn is_for_users(text: &str) -> bool {
     let bare = without(&without(text, '{', '}'), '<', '>');
     let bare = bare.trim();
@@ -28,13 +28,13 @@ pub(super) fn is_for_users(text: &str) -> bool {
     if bare.contains(char::is_whitespace) {
         return true;
     }
-    // One word: a label begins with a capital letter and goes on with small ones.
+    // A single word counts as a label if only its first letter is a capital.
     let is_small = |letter: char| !letter.is_uppercase() && !matches!(letter, '_' | '/');
     let is_label = bare.starts_with(char::is_uppercase) && bare.chars().skip(1).all(is_small);
     is_label || bare.chars().any(|letter| letter.is_alphabetic() && !letter.is_ascii())
 }
 
-/// True for scripts, markup without words, and other languages of programs.
+/// True for scripts, markup without words, and other program code.
 fn is_of_programs(text: &str) -> bool {
     let is_open_tag = text.rfind('<').is_some_and(|start| {
         text[start + 1..].starts_with(|letter: char| letter.is_ascii_lowercase())
@@ -76,7 +76,7 @@ pub(super) fn texts_of_page(page: &str) -> Vec<(usize, String)> {
     found
 }
 
-/// True for a text with the number of a requirement, such as R71.
+/// True for a text with a requirement number, such as R71.
 pub(super) fn quotes_requirement(text: &str) -> bool {
     let letters: Vec<char> = text.chars().collect();
     letters.iter().enumerate().any(|(at, letter)| {

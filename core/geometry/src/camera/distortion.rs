@@ -8,9 +8,9 @@
 //!
 //! The inverse solves `k1 u + k3 u³ + k5 u⁵ = 1` for the ratio u = χ/χ', with k1 = 1 + r0, k3 = r1 χ'² and k5 = r2
 //! χ'⁴. Two departures from VICAR's code: Newton starts at u = 1 instead of 1 − (r0 + k3 + k5), from where it cannot
-//! overshoot the fold of a polynomial with negative terms; and a radius beyond the first fold (where dχ'/dχ = 1 + r0
-//! + 3 r1 t + 5 r2 t² reaches zero) is rejected in both directions: beyond it the polynomial decreases, so that
-//! points behind a hazcam would appear in its image, mirrored.
+//! overshoot the fold of a polynomial with negative terms; and a radius beyond the first fold (where
+//! dχ'/dχ = 1 + r0 + 3 r1 t + 5 r2 t² reaches zero) is rejected in both directions: beyond it the polynomial
+//! decreases, so that points behind a hazcam would appear in its image, mirrored.
 
 use crate::frames::Vector3;
 

@@ -1,11 +1,11 @@
-//! The arrays of a step as small pictures with words: what a template looked like, and where it fitted.
+//! The arrays of a step as small images with captions, such as the template and the score map.
 
 use image::{ImageFormat, Luma};
 use sightline_track::trace::{ArrayName, StepTrace};
 
 use crate::html::{escape, png_address};
 
-/// Every array of a step that is a picture.
+/// Every image array of a step.
 pub(super) fn figures(trace: &StepTrace) -> String {
     let figures: Vec<String> = ArrayName::all().filter_map(|name| figure(trace, name)).collect();
     if figures.is_empty() {
@@ -26,7 +26,7 @@ fn figure(trace: &StepTrace, name: ArrayName) -> Option<String> {
     if low > high {
         return None;
     }
-    // Signed values have their zero in the middle grey.
+    // For signed values, zero is mid grey.
     let is_signed = declared.kind.is_signed();
     let reach = high.max(-low);
     let (low, high) = if is_signed { (-reach, reach) } else { (low, high) };
@@ -40,7 +40,7 @@ fn figure(trace: &StepTrace, name: ArrayName) -> Option<String> {
     let missing = values.len() - known().count();
     let holes = if missing > 0 { format!("; {missing} have no value and are black") } else { String::new() };
     let limits = format!("{width} × {height} values, black to white from {low:.3} to {high:.3}{holes}.");
-    // What is larger than a template stands wider.
+    // Arrays larger than a template are displayed wider.
     let class = if width <= 64 { "patch" } else { "map" };
     Some(format!(
         "<figure class=\"{class}\"><img src=\"{}\" alt=\"{}\" width=\"{width}\" height=\"{height}\"><figcaption>{words}. {limits}</figcaption></figure>\n",

@@ -3,11 +3,11 @@
 use std::fmt::Write;
 
 use super::{page, step_path};
-use crate::exports::{Part, Source, note_html, run_letter};
+use crate::exports::{SessionPart, Source, note_html, run_letter};
 use crate::html::{escape, table};
 use crate::state::AppState;
 
-/// All sessions.
+/// The page with all sessions.
 pub(super) fn all(state: &AppState) -> String {
     let mut html = "<h1>Sightline, in plain pages</h1>\n<p>Every step of every run can be read here without the viewer.</p>\n".to_owned();
     html.push_str("<h2>Sessions</h2>\n<ul>\n");
@@ -33,7 +33,7 @@ pub(super) fn all(state: &AppState) -> String {
     page("Sessions", &html)
 }
 
-/// One session.
+/// The page of one session.
 pub(super) fn session(source: &Source) -> String {
     let session = &source.session;
     let name = escape(&source.open.traverse.index().name);
@@ -49,7 +49,7 @@ pub(super) fn session(source: &Source) -> String {
         let path = step_path(&session.id, target, cursor.run, cursor.step);
         let _ = writeln!(html, "<p><a href=\"{path}\">Current step: step {}</a></p>", cursor.step);
     }
-    let runs = source.runs(Part::default());
+    let runs = source.runs(SessionPart::default());
     html.push_str("<h2>Targets and runs</h2>\n");
     if runs.is_empty() {
         html.push_str("<p>No target was picked yet.</p>\n");

@@ -1,4 +1,5 @@
-//! The page of one step: the state in a sentence, the pictures, the verdict, every stage's record, the truth and the notes.
+//! The page of one step: the state in a sentence, the images, the verdict, every stage's record, the ground truth and the
+//! notes.
 
 use std::fmt::Write;
 use std::sync::atomic::AtomicBool;
@@ -9,15 +10,15 @@ use sightline_session::records;
 use sightline_session::step::{RunStep, StepRow};
 
 use super::{arrays, page, step_path, values};
-use crate::exports::{Part, Source, note_html, picture, run_letter};
+use crate::exports::{SessionPart, Source, note_html, run_letter, step_image};
 use crate::html::{escape, png_address, table};
 use crate::problem::{ApiError, ApiResult};
 use crate::routes::notes;
 
-/// The page.
+/// The HTML of the page.
 ///
 /// # Errors
-/// A problem when there is no such step, or it was not computed yet.
+/// A problem if the step does not exist or was not computed yet.
 pub(super) fn html(
     source: &Source,
     target: usize,
@@ -79,7 +80,7 @@ fn navigation(source: &Source, target: usize, run: usize, found: &Run, step: usi
     link("Next step", has(step + 1));
     link("Previous event", events.iter().copied().rev().find(|event| *event < step));
     link("Next event", events.iter().copied().find(|event| *event > step));
-    for other in source.runs(Part { target: Some(target), run: None }) {
+    for other in source.runs(SessionPart { target: Some(target), run: None }) {
         if other.number != run && other.run.step(step).is_some() {
             let to = step_path(id, target, other.number, step);
             let letter = run_letter(other.number);
@@ -91,18 +92,18 @@ fn navigation(source: &Source, target: usize, run: usize, found: &Run, step: usi
     format!("<nav aria-label=\"Steps and runs\"><ul>{}</ul></nav>\n", links.concat())
 }
 
-/// The steps at which the state changes, the designation and the faults included.
+/// The steps at which the state changes, including the designation and faults.
 fn events(rows: &[StepRow]) -> Vec<usize> {
     let changed = |pair: &&[StepRow]| pair[0].state != pair[1].state || pair[1].fault;
     let first = rows.first().map(|row| row.step);
     first.into_iter().chain(rows.windows(2).filter(changed).map(|pair| pair[1].step)).collect()
 }
 
-/// State and most important numbers in a sentence.
+/// The state and the main numbers in a sentence.
 fn sentence(trace: &RunStep) -> String {
     let row = trace.row();
     let good = if trace.update.state.is_lost() { "bad" } else { "good" };
-    let state = picture::state_words(trace).to_lowercase();
+    let state = step_image::state_words(trace).to_lowercase();
     let numbers = [
         row.ncc.map(|score| format!("NCC {score:.2}")),
         row.inliers.map(|count| format!("{count} inliers")),
@@ -125,15 +126,18 @@ fn pictures(source: &Source, run: &Run, trace: &RunStep, cancel: &AtomicBool) ->
         images => images.ok().map(|[left, _]| left),
     };
     let mut html = "<h2>Pictures</h2>\n".to_owned();
-    let close = picture::png(trace, left.as_deref(), &run.settings).map_err(ApiError::internal)?;
-    let [width, height] = picture::plain_size();
-    let words = format!("{}. {}", picture::numbers(&trace.row()), picture::LEGEND);
+    let close = step_image::png(trace, left.as_deref(), &run.settings).map_err(ApiError::internal)?;
+    let [width, height] = step_image::plain_size();
+    let words = format!("{}. {}", step_image::numbers(&trace.row()), step_image::LEGEND);
     let _ = writeln!(
         html,
         "<figure><img src=\"{}\" width=\"{width}\" height=\"{height}\" alt=\"{}\"><figcaption>The target in the left image. {}</figcaption></figure>",
         png_address(&close),
-        escape(&format!("Close-up of the target, {}. {words}", picture::state_words(trace).to_lowercase())),
-        escape(picture::LEGEND)
+        escape(&format!(
+            "Close-up of the target, {}. {words}",
+            step_image::state_words(trace).to_lowercase()
+        )),
+        escape(step_image::LEGEND)
     );
     let (pointing, located) = (&trace.point_mast, trace.located());
     let eyes = [
@@ -147,11 +151,11 @@ fn pictures(source: &Source, run: &Run, trace: &RunStep, cancel: &AtomicBool) ->
         let [width, height] = camera.size;
         let path =
             format!("/api/v1/traverses/{}/steps/{}/images/{eye}.png{query}", source.open.id, trace.step);
-        let place = found.map_or_else(
+        let position_text = found.map_or_else(
             || "the target was not found in it".to_owned(),
             |pixel| format!("the target is at pixel {:.1}, {:.1}", pixel.x, pixel.y),
         );
-        let words = format!("The {eye} image of the stop, {width} × {height} pixels; {place}.");
+        let words = format!("The {eye} image of the stop, {width} × {height} pixels; {position_text}.");
         let _ = writeln!(
             html,
             "<figure><img src=\"{path}\" width=\"{width}\" height=\"{height}\" loading=\"lazy\" alt=\"{words}\"><figcaption>{words}</figcaption></figure>"
@@ -161,7 +165,7 @@ fn pictures(source: &Source, run: &Run, trace: &RunStep, cancel: &AtomicBool) ->
     Ok(html)
 }
 
-/// Every criterion with value, limit and margin.
+/// Every gate with value, limit and margin.
 fn verdict(trace: &RunStep) -> String {
     let mut html = "<h2>Verdict</h2>\n".to_owned();
     let Some(verdict) = trace.verdict() else {
@@ -209,10 +213,10 @@ fn verdict(trace: &RunStep) -> String {
     html
 }
 
-/// Fields that are left out of the tables of stages: camera models, and the criteria, which have a table of their own.
+/// Fields omitted from the tables of stages: camera models, and the gates, which have their own table.
 const LEFT_OUT: [&str; 4] = ["left", "right", "camera", "gates"];
 
-/// The record of every stage; of the steps of `locate` those that were reached.
+/// The record of every stage; of the stages of `locate`, those that were reached.
 fn stages(trace: &RunStep) -> String {
     let mut html = "<h2>Stages</h2>\n".to_owned();
     for stage in records::stages() {
@@ -237,7 +241,7 @@ fn stages(trace: &RunStep) -> String {
     html
 }
 
-/// The comparison with the truth.
+/// The comparison with the ground truth.
 fn truth(trace: &RunStep) -> String {
     let mut html = "<h2>Error against the truth</h2>\n".to_owned();
     match records::stage("truth").filter(|truth| truth.is_reached(trace)) {

@@ -6,10 +6,10 @@ use sightline_session::format;
 use sightline_session::records;
 use sightline_session::step::RunStep;
 
-/// Lists of more numbers than these are counted, not listed.
+/// Longer lists of numbers are not printed; only their length is.
 const MOST_LISTED: usize = 9;
 
-/// The quantities of a stage, then the rest of its evidence without the fields called `without`, at any depth.
+/// The quantities of a stage, then the rest of its evidence, except fields named in `without`, at any depth.
 pub(super) fn rows(stage: &Stage<RunStep>, trace: &RunStep, without: &[&str]) -> Vec<Vec<String>> {
     let schema = stage.schema();
     let row = |(index, quantity): (usize, &sightline_record::Quantity)| {
@@ -21,7 +21,7 @@ pub(super) fn rows(stage: &Stage<RunStep>, trace: &RunStep, without: &[&str]) ->
     rows
 }
 
-/// The values of the evidence at a path, those of records inside it under their names.
+/// Collects the values of the evidence at a path, and those of nested records with their names.
 fn collect(path: &str, around: &str, value: &Value, without: &[&str], rows: &mut Vec<Vec<String>>) {
     match value {
         Value::Object(fields) => {
@@ -36,7 +36,7 @@ fn collect(path: &str, around: &str, value: &Value, without: &[&str], rows: &mut
     }
 }
 
-/// The name of a field with commas between the records around it.
+/// The name of a field, with commas between nested records.
 fn in_words(name: &str) -> String {
     name.replace('.', ", ").replace('_', " ")
 }
@@ -62,7 +62,7 @@ fn words(value: &Value) -> String {
     }
 }
 
-/// The unit of the field at a path, as the record declares it; components have that of the whole.
+/// The declared unit of the field at a path; components have the unit of the whole.
 fn unit(path: &str) -> &'static str {
     let whole = path.rsplit_once('.').filter(|(_, part)| part.len() == 1).map_or(path, |(whole, _)| whole);
     records::unit_at(whole).map_or("", Unit::symbol)

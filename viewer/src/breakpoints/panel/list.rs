@@ -71,7 +71,7 @@ fn show_one(ui: &mut Ui, state: &State, at: usize, breakpoint: &BreakpointView, 
         paint_mark(ui.painter(), rect.center(), shape, colour, 5.0);
         let mut is_on = *on;
         let check = ui.checkbox(&mut is_on, RichText::new(expression).monospace());
-        if check.on_hover_text("whether it is looked for").changed() {
+        if check.on_hover_text("on or off").changed() {
             out.push(Command::Breakpoints(BreakpointCommand::Switch { number: *number, on: is_on }));
         }
         let words = match (on, &breakpoint.problem) {

@@ -12,7 +12,7 @@ use crate::theme;
 
 /// Accessible names of the combo boxes.
 const NAMES: [&str; RUNS_MAX] =
-    ["run looked at", "compared with", "third run compared", "fourth run compared"];
+    ["selected run", "compared with", "third run compared", "fourth run compared"];
 
 /// Shows the combo boxes, if a run is selected.
 pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {

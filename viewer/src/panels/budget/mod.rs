@@ -58,7 +58,7 @@ pub(crate) fn show(ui: &mut Ui, state: &State, out: &mut Vec<Command>) {
             Some(pair) => results(ui, &pair, &state.calculator.approach),
             None => {
                 let sentence =
-                    "The present cameras are known once a step with a target is loaded: pick one, or choose another pair.";
+                    "The current cameras are known once a step with a target is loaded: pick one, or choose another pair.";
                 ui.add(egui::Label::new(RichText::new(sentence).color(theme::lost())).wrap());
             }
         }

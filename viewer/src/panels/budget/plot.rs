@@ -105,7 +105,7 @@ fn sentence(curves: &Curves) -> String {
         all += 1;
         within += usize::from(error_m <= budget_m);
     }
-    format!("{within} of {all} errors lie within the 3σ predicted with tracking")
+    format!("{within} of {all} errors are within the 3σ predicted with tracking")
 }
 
 fn of_run(run: &RunView) -> Curves {
@@ -164,7 +164,7 @@ mod tests {
             with: vec![[10.0, 0.4], [5.0, 0.1], [2.0, 0.02]],
             achieved: vec![[10.0, 0.1], [5.0, 0.2], [2.0, 0.02]],
         };
-        assert_eq!(sentence(&curves), "2 of 3 errors lie within the 3σ predicted with tracking");
+        assert_eq!(sentence(&curves), "2 of 3 errors are within the 3σ predicted with tracking");
     }
 
     #[test]

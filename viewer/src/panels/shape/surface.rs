@@ -19,7 +19,7 @@ const KINDS: [(&str, &str); 7] = [
     ("not unique", "another disparity matches nearly as well"),
     ("left–right", "the right image does not confirm it"),
     ("speckle", "in too small a patch"),
-    ("out of range", "nearer or farther than what is looked for"),
+    ("out of range", "nearer or farther than the range limits"),
 ];
 
 /// Shows the part.

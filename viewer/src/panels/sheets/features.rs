@@ -43,7 +43,7 @@ fn residuals(state: &State, all: &[Feature]) -> Sheet {
 }
 
 fn draws(agreeing: &[u32]) -> Sheet {
-    let columns = vec![Column::new("draw of three", ""), Column::new("matches that agree", "")];
+    let columns = vec![Column::new("iteration", ""), Column::new("inliers", "")];
     let mut sheet = Sheet::of("Inliers by RANSAC iteration", columns);
     let best = agreeing.iter().max();
     for (draw, count) in agreeing.iter().enumerate() {

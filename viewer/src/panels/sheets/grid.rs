@@ -95,9 +95,9 @@ fn line(ui: &mut Ui, row: &SheetRow, widths: &[f32], out: &mut Vec<Command>) {
     }
     ui.horizontal(|ui| {
         let name = match (row.step, row.is_present) {
-            (Some(step), true) => format!("step {step}, the present one"),
+            (Some(step), true) => format!("step {step}, the current one"),
             (Some(step), false) => format!("step {step}"),
-            (None, true) => "the present one".to_owned(),
+            (None, true) => "the current one".to_owned(),
             (None, false) => String::new(),
         };
         role(ui, egui::Role::Row, &name);

@@ -94,9 +94,9 @@ fn refinement(path: &[PathStep]) -> Sheet {
         ("shift x", "cm"),
         ("shift y", "cm"),
         ("shift z", "cm"),
-        ("turn x", "°"),
-        ("turn y", "°"),
-        ("turn z", "°"),
+        ("rotation x", "°"),
+        ("rotation y", "°"),
+        ("rotation z", "°"),
     ];
     let columns = columns.map(|(name, unit)| Column::new(name, unit)).to_vec();
     let mut sheet = Sheet::of("Iterations of the refinement, axes of the sensor", columns);

@@ -1,4 +1,4 @@
-//! The end of the program in the middle of work.
+//! Termination of the program during work.
 
 use std::io::Write;
 use std::process::Command;
@@ -8,35 +8,35 @@ use std::time::{Duration, Instant};
 use serde_json::json;
 use sightline_tests::server::{long_recording, small_drive};
 
-use super::{ONE, begin, has_ended, scale, tell, until};
-use crate::ending::crowded;
-use crate::keeping::Killable;
+use super::{EXCLUSIVE, begin, has_ended, print_row, scale, until};
+use crate::persistence::ServerProcess;
+use crate::shutdown::crowded;
 
-/// How long the program may take to end, s; in the tests far less than its work takes, on a busy machine too.
+/// Maximum time for the program to end, s; much less than its work takes, also on a busy machine.
 const PATIENCE_S: [u64; 2] = [2, 20];
 
 /// A load, with its name.
-type Load = (&'static str, fn(&Killable));
+type Load = (&'static str, fn(&ServerProcess));
 
-/// Ends a server as the system does, and waits for it; how long it took.
-fn terminate(mut server: Killable) -> Duration {
+/// Sends SIGTERM to a server and waits for its end; returns the time that it took.
+fn terminate(mut server: ServerProcess) -> Duration {
     let id = server.id().to_string();
-    let told = Instant::now();
+    let signalled = Instant::now();
     assert!(Command::new("kill").args(["-TERM", &id]).status().unwrap().success());
     loop {
         if let Some(status) = server.process().try_wait().unwrap() {
             assert!(status.success(), "{status}");
-            return told.elapsed();
+            return signalled.elapsed();
         }
         let patience = Duration::from_secs(scale(PATIENCE_S[0], PATIENCE_S[1]));
-        assert!(told.elapsed() < patience, "the program does not end");
+        assert!(signalled.elapsed() < patience, "the program does not end");
         std::thread::sleep(Duration::from_millis(5));
     }
 }
 
 #[test]
 fn drill_the_program_ends_under_any_load() {
-    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let _exclusive = EXCLUSIVE.lock().unwrap_or_else(PoisonError::into_inner);
     let stops = scale(4805, 1205);
     let drive = long_recording(stops);
     let loads: [Load; 5] = [
@@ -66,29 +66,29 @@ fn drill_the_program_ends_under_any_load() {
             let body = json!({ "scenario": crowded() }).to_string();
             let mut stream = server.open("POST", "traverses", "", &body);
             stream.flush().unwrap();
-            // Reading the scenario takes less.
+            // Reading the scenario takes less time.
             std::thread::sleep(Duration::from_secs(4));
         }),
     ];
     let mut times = Vec::new();
     for (name, load) in loads {
         let data = tempfile::tempdir().unwrap();
-        let server = Killable::start(drive.path(), data.path());
+        let server = ServerProcess::start(drive.path(), data.path());
         load(&server);
         std::thread::sleep(Duration::from_millis(300));
         times.push(format!("{name} {:.2} s", terminate(server).as_secs_f64()));
     }
-    tell("SIGTERM under load", &times.join(", "));
+    print_row("SIGTERM under load", &times.join(", "));
 }
 
 #[test]
 fn drill_what_was_acknowledged_survives_kills_during_runs() {
-    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let _exclusive = EXCLUSIVE.lock().unwrap_or_else(PoisonError::into_inner);
     let rounds: u64 = scale(20, 2);
     let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
     let mut rows = None;
     for round in 0..rounds {
-        let server = Killable::start(drive.path(), data.path());
+        let server = ServerProcess::start(drive.path(), data.path());
         assert_eq!(server.get("health")["notices"], json!([]), "round {round}");
         for before in 1..=round {
             let path = format!("sessions/s{before}/targets/0/runs/0");
@@ -101,7 +101,7 @@ fn drill_what_was_acknowledged_survives_kills_during_runs() {
         std::thread::sleep(Duration::from_millis(17 * round));
         server.kill();
     }
-    tell(
+    print_row(
         "kill −9 during runs",
         &format!("{rounds} kills, every session is there and its rows are the same bits"),
     );

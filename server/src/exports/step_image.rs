@@ -1,10 +1,10 @@
-//! The target in the left image of a step, with what was predicted, found and true, and the state in words.
+//! The target in the left image of a step, with the predicted, found and true position, and the tracking state as text.
 //!
 //! | mark | meaning |
 //! |---|---|
-//! | blue square with cross, and ellipse | the window that was found, and its 3σ |
+//! | blue square with cross, and ellipse | the found window and its 3σ |
 //! | sky ring, and dotted ellipse | the prediction and its 3σ gate |
-//! | white plus | the truth |
+//! | white plus | the ground truth |
 //! Colours are those of Okabe and Ito, the same as in the viewer and in recordings.
 
 use nalgebra::{Matrix2, SymmetricEigen, Vector2};
@@ -17,14 +17,14 @@ use sightline_track::settings::Settings;
 use sightline_track::target::TrackingState;
 use sightline_vision::image::GrayImage;
 
-use super::canvas::{Canvas, Line, Rgb, Window};
-use super::source::place_of;
+use super::canvas::{Canvas, LineStyle, Rgb, Window};
+use super::source::target_pixel;
 
-/// Side of the part of the image that is shown, px of the image.
+/// Side of the visible part, px of the image.
 const SIDE_PX: f64 = 160.0;
-/// Side of the picture, px.
-pub(super) const PICTURE_PX: u32 = 320;
-/// Height of the words above and below, px.
+/// Side of the drawn image, px.
+pub(super) const IMAGE_PX: u32 = 320;
+/// Height of the text above and below, px.
 const HEAD_PX: u32 = 22;
 const FOOT_PX: u32 = 42;
 
@@ -38,29 +38,29 @@ const PREDICTION: Rgb = [0x56, 0xb4, 0xe9];
 const MEASUREMENT: Rgb = [0x2f, 0x8f, 0xd0];
 const TRUTH: Rgb = [0xff, 0xff, 0xff];
 
-/// What the marks mean, in words, for whoever cannot see or has no legend.
+/// Explains the marks in text, for readers who cannot see the image or have no legend.
 pub(crate) const LEGEND: &str = "Blue square: where it was found, with its 3σ ellipse. Sky blue ring: the prediction, with its 3σ gate dotted. \
                           White plus: the truth, where it is known.";
 
-/// Width and height of a picture with its words, px.
+/// Width and height of the image with its text, px.
 pub(super) fn size(has_head: bool) -> [u32; 2] {
-    [PICTURE_PX, PICTURE_PX + FOOT_PX + if has_head { HEAD_PX } else { 0 }]
+    [IMAGE_PX, IMAGE_PX + FOOT_PX + if has_head { HEAD_PX } else { 0 }]
 }
 
-/// Width and height of a picture without a line above it, px.
+/// Width and height without a heading, px.
 pub(crate) fn plain_size() -> [u32; 2] {
     size(false)
 }
 
-/// The picture of a step as a PNG file.
+/// Draws the image of a step as PNG.
 ///
 /// # Errors
-/// What the encoder says.
+/// The message of the encoder.
 pub(crate) fn png(trace: &RunStep, left: Option<&GrayImage>, settings: &Settings) -> Result<Vec<u8>, String> {
     draw(trace, left, settings, None).ok_or("a picture without pixels")?.png()
 }
 
-/// The picture of a step; `head` is a line above it. None of the images: their place is a checker.
+/// Draws the image of a step with an optional heading `head`; a chequerboard without the left image.
 pub(super) fn draw(
     trace: &RunStep,
     left: Option<&GrayImage>,
@@ -75,23 +75,23 @@ pub(super) fn draw(
     }
     let empty = GrayImage::default();
     let image = left.unwrap_or(&empty);
-    let centre = place_of(trace).unwrap_or_else(|| {
+    let centre = target_pixel(trace).unwrap_or_else(|| {
         Pixel::new(f64::from(image.width()) / 2.0 - 0.5, f64::from(image.height()) / 2.0 - 0.5)
     });
     let window = Window {
         origin: [centre.x + 0.5 - SIDE_PX / 2.0, centre.y + 0.5 - SIDE_PX / 2.0],
-        scale: f64::from(PICTURE_PX) / SIDE_PX,
+        scale: f64::from(IMAGE_PX) / SIDE_PX,
         at: [0.0, f64::from(top)],
-        size: [PICTURE_PX; 2],
+        size: [IMAGE_PX; 2],
     };
     canvas.image(image, &window);
     paint_marks(&mut canvas, trace, &window, settings);
-    // Marks that reach over the picture's border are cut there.
+    // Drawn after the marks, to cover any that extend beyond the image.
     if let Some(words) = head {
         canvas.fill([0.0, 0.0], [width as f32, top as f32], PAPER);
         canvas.text([6.0, 4.0], 13.0, width as f32 - 12.0, INK, words);
     }
-    foot(&mut canvas, trace, (top + PICTURE_PX) as f32);
+    foot(&mut canvas, trace, (top + IMAGE_PX) as f32);
     Some(canvas)
 }
 
@@ -100,28 +100,28 @@ fn paint_marks(canvas: &mut Canvas, trace: &RunStep, window: &Window, settings: 
     for Mark { name, shape } in marks(trace, side_px) {
         match (name, shape) {
             (MarkName::PredictedLeft, Shape::Point(pixel)) => {
-                canvas.line(&ring(window, pixel, 2.5), true, PREDICTION, Line::Solid);
+                canvas.line(&ring(window, pixel, 2.5), true, PREDICTION, LineStyle::Solid);
             }
             (MarkName::PredictionGate, Shape::Ellipse { centre, covariance_px2, sigmas }) => {
                 let contours = sigmas.iter().filter_map(|s| ellipse(window, centre, &covariance_px2, *s));
-                contours.for_each(|points| canvas.line(&points, true, PREDICTION, Line::Dotted));
+                contours.for_each(|points| canvas.line(&points, true, PREDICTION, LineStyle::Dotted));
             }
             (MarkName::LocatedLeft, Shape::Point(pixel)) => {
                 let corners = square(pixel, side_px, &Matrix2::identity());
-                let corners = corners.map(|corner| window.place(corner.x, corner.y));
-                canvas.line(&corners, true, MEASUREMENT, Line::Solid);
+                let corners = corners.map(|corner| window.to_canvas(corner.x, corner.y));
+                canvas.line(&corners, true, MEASUREMENT, LineStyle::Solid);
                 for stroke in cross(window, pixel, 2.0) {
-                    canvas.line(&stroke, false, MEASUREMENT, Line::Solid);
+                    canvas.line(&stroke, false, MEASUREMENT, LineStyle::Solid);
                 }
             }
             (MarkName::LocatedError, Shape::Ellipse { centre, covariance_px2, sigmas }) => {
                 let contours = sigmas.iter().filter_map(|s| ellipse(window, centre, &covariance_px2, *s));
-                contours.for_each(|points| canvas.line(&points, true, MEASUREMENT, Line::Solid));
+                contours.for_each(|points| canvas.line(&points, true, MEASUREMENT, LineStyle::Solid));
             }
             (MarkName::TrueLeft, Shape::Point(pixel)) => {
-                let [x, y] = window.place(pixel.x, pixel.y);
-                canvas.line(&[[x - 8.0, y], [x + 8.0, y]], false, TRUTH, Line::Solid);
-                canvas.line(&[[x, y - 8.0], [x, y + 8.0]], false, TRUTH, Line::Solid);
+                let [x, y] = window.to_canvas(pixel.x, pixel.y);
+                canvas.line(&[[x - 8.0, y], [x + 8.0, y]], false, TRUTH, LineStyle::Solid);
+                canvas.line(&[[x, y - 8.0], [x, y + 8.0]], false, TRUTH, LineStyle::Solid);
             }
             _ => {}
         }
@@ -138,7 +138,7 @@ fn foot(canvas: &mut Canvas, trace: &RunStep, top: f32) {
     canvas.text([16.0, top + 23.0], 11.0, width as f32 - 20.0, INK, &numbers(&row));
 }
 
-/// The state in capitals, with the count of bad updates.
+/// The state in capitals, with the number of failed updates if lost.
 pub(crate) fn state_words(trace: &RunStep) -> String {
     match trace.update.state {
         TrackingState::Lost { count } => format!("LOST {count}"),
@@ -146,7 +146,7 @@ pub(crate) fn state_words(trace: &RunStep) -> String {
     }
 }
 
-/// The columns of a row below a picture, each with the unit in which it is written, and its digits.
+/// The row columns printed below an image, each with its display unit and number of digits.
 const COLUMNS: [(&str, Unit, usize); 5] = [
     ("ncc", Unit::One, 2),
     ("inliers", Unit::One, 0),
@@ -155,7 +155,7 @@ const COLUMNS: [(&str, Unit, usize); 5] = [
     ("range_m", Unit::Metre, 2),
 ];
 
-/// The numbers of a step that matter most, with their units.
+/// The main numbers of a step, with units.
 pub(crate) fn numbers(row: &StepRow) -> String {
     let words = |(name, unit, digits): &(&str, Unit, usize)| {
         let value = records::row_value_in(row, name, *unit)?;
@@ -177,7 +177,7 @@ pub(super) fn state_colour(state: TrackingState) -> Rgb {
 }
 
 fn ring(window: &Window, at: Pixel, radius_px: f64) -> Vec<[f32; 2]> {
-    around(|x, y| window.place(at.x + radius_px * x, at.y + radius_px * y))
+    around(|x, y| window.to_canvas(at.x + radius_px * x, at.y + radius_px * y))
 }
 
 fn ellipse(window: &Window, at: Pixel, covariance_px2: &Matrix2<f64>, sigmas: f64) -> Option<Vec<[f32; 2]>> {
@@ -189,17 +189,18 @@ fn ellipse(window: &Window, at: Pixel, covariance_px2: &Matrix2<f64>, sigmas: f6
     let axes = eigen.eigenvectors * Matrix2::from_diagonal(&lengths);
     Some(around(|x, y| {
         let offset = axes * Vector2::new(x, y);
-        window.place(at.x + offset.x, at.y + offset.y)
+        window.to_canvas(at.x + offset.x, at.y + offset.y)
     }))
 }
 
-fn around(place: impl Fn(f64, f64) -> [f32; 2]) -> Vec<[f32; 2]> {
+fn around(to_canvas: impl Fn(f64, f64) -> [f32; 2]) -> Vec<[f32; 2]> {
     const POINTS: u32 = 64;
     let angle = |k: u32| f64::from(k) / f64::from(POINTS) * std::f64::consts::TAU;
-    (0..POINTS).map(|k| place(angle(k).cos(), angle(k).sin())).collect()
+    (0..POINTS).map(|k| to_canvas(angle(k).cos(), angle(k).sin())).collect()
 }
 
 fn cross(window: &Window, at: Pixel, arm_px: f64) -> [[[f32; 2]; 2]; 2] {
-    let stroke = |x: f64, y: f64| [window.place(at.x - x, at.y - y), window.place(at.x + x, at.y + y)];
+    let stroke =
+        |x: f64, y: f64| [window.to_canvas(at.x - x, at.y - y), window.to_canvas(at.x + x, at.y + y)];
     [stroke(arm_px, arm_px), stroke(arm_px, -arm_px)]
 }

@@ -1,4 +1,4 @@
-//! Requests that are sent again: with a key they create once, and a run that is unchanged is not sent again.
+//! Repeated requests: with a key they create once, and an unchanged run is not sent again.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ async fn with_key(server: &TestServer, path: &str, key: &str, body: &Value) -> A
     server.send(request.unwrap()).await
 }
 
-/// The answer without what each request has of its own.
+/// The response without the headers that differ for each request.
 fn same(answer: &Answer) -> (u16, Option<String>, Vec<u8>) {
     let location = answer.headers.get(header::LOCATION).map(|value| value.to_str().unwrap().to_owned());
     (answer.status.as_u16(), location, answer.bytes.clone())
@@ -69,7 +69,7 @@ async fn a_key_is_of_one_request() {
     for wrong in ["", "two words", &"x".repeat(256)] {
         with_key(&server, "sessions", wrong, &body).await.problem(422, "idempotency_key");
     }
-    // What was refused has created nothing and may be sent again.
+    // A refused request creates nothing and may be repeated.
     let missing = json!({ "traverse": "nowhere" });
     with_key(&server, "sessions", "later", &missing).await.problem(422, "field");
     with_key(&server, "sessions", "later", &body).await.expect(201);

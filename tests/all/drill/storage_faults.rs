@@ -1,4 +1,4 @@
-//! A full disk and images that are gone.
+//! A full disk, and missing images.
 
 use std::path::Path;
 use std::process::Command;
@@ -7,11 +7,11 @@ use std::sync::PoisonError;
 use serde_json::{Value, json};
 use sightline_tests::server::{small_drive, small_recording};
 
-use super::{ONE, begin, has_ended, tell, until};
+use super::{EXCLUSIVE, begin, has_ended, print_row, until};
 use crate::cli::program;
-use crate::keeping::Killable;
+use crate::persistence::ServerProcess;
 
-/// A small file system in memory, which only an administrator may make.
+/// A small file system in memory, which needs administrator rights.
 struct SmallDisk(tempfile::TempDir);
 
 impl SmallDisk {
@@ -35,17 +35,17 @@ impl Drop for SmallDisk {
 
 #[test]
 fn drill_a_full_disk_is_reported_and_later_writes_succeed() {
-    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let _exclusive = EXCLUSIVE.lock().unwrap_or_else(PoisonError::into_inner);
     let Some(disk) = SmallDisk::make() else {
-        tell("full disk", "left out: only an administrator may mount a small file system");
+        print_row("full disk", "left out: only an administrator may mount a small file system");
         return;
     };
     let drive = small_drive();
-    let server = Killable::start(drive.path(), disk.path());
+    let server = ServerProcess::start(drive.path(), disk.path());
     let session = begin(&server, 0);
     until(&server, &format!("sessions/{session}/targets/0/runs/0"), has_ended);
     let filler = disk.path().join("filler");
-    // Fails when the disk is full, which is its purpose.
+    // Fails because the disk is full, as intended.
     assert!(std::fs::write(&filler, vec![1_u8; 16 << 20]).is_err(), "the disk is too large");
     let note = |number: usize| json!({ "step": 0, "text": format!("{number} {}", "x".repeat(3000)) });
     let notes = format!("sessions/{session}/notes");
@@ -63,18 +63,18 @@ fn drill_a_full_disk_is_reported_and_later_writes_succeed() {
     let in_vain = refused_changes(&server, &session);
     exports_are_whole_or_absent(disk.path(), &drive.path().join("traverse.toml"));
     std::fs::remove_file(&filler).unwrap();
-    // Without anybody's change it is found out that there is room again.
+    // The server detects the free space without any change by a user.
     until(&server, "health", |health| health["notices"] == json!([]));
     for number in 0..20 {
         server.json("POST", &notes, &note(number));
     }
     assert_eq!(server.get("health")["notices"], json!([]));
-    let count = |server: &Killable| server.get(&notes).as_array().unwrap().len();
+    let count = |server: &ServerProcess| server.get(&notes).as_array().unwrap().len();
     assert_eq!(count(&server), acknowledged + 20);
     server.kill();
-    let server = Killable::start(drive.path(), disk.path());
+    let server = ServerProcess::start(drive.path(), disk.path());
     assert_eq!(count(&server), acknowledged + 20);
-    tell(
+    print_row(
         "full disk, and space again",
         &format!(
             "{acknowledged} + 20 changes acknowledged and kept; {in_vain} more refused with {status} and taken back; health \
@@ -83,20 +83,20 @@ fn drill_a_full_disk_is_reported_and_later_writes_succeed() {
     );
 }
 
-/// What a session shows.
-fn shown(server: &Killable, session: &str) -> Vec<Value> {
+/// The visible state of a session.
+fn shown(server: &ServerProcess, session: &str) -> Vec<Value> {
     let paths = ["", "/notes", "/breakpoints"].map(|part| format!("sessions/{session}{part}"));
     let all = paths.iter().map(String::as_str).chain(["sessions", "documents", "studies/jobs"]);
     let mut shown: Vec<Value> = all.map(|path| server.get(path)).collect();
-    // The time since the last use goes on.
+    // The time since the last use increases.
     for entry in shown.iter_mut().filter_map(Value::as_array_mut).flatten() {
         entry.as_object_mut().and_then(|fields| fields.remove("idle_s"));
     }
     shown
 }
 
-/// Tries changes of every kind on a full disk until one of each is refused; nothing of it may be seen. How many were refused.
-fn refused_changes(server: &Killable, session: &str) -> usize {
+/// Tries changes of every kind on a full disk until one of each is refused without effect; returns the number of refusals.
+fn refused_changes(server: &ServerProcess, session: &str) -> usize {
     let traverse = server.get("traverses")[0]["id"].clone();
     let [x, y] = sightline_tests::server::PIXEL;
     let at = |part: &str| format!("sessions/{session}/{part}");
@@ -114,7 +114,7 @@ fn refused_changes(server: &Killable, session: &str) -> usize {
         let before = shown(server, session);
         let text = if body.is_null() { String::new() } else { body.to_string() };
         let (status, answer) = server.answer(method, &path, "If-Match: *\r\n", &text);
-        // What is small may find room in the file.
+        // A small change may still fit into the file.
         if status < 300 {
             continue;
         }
@@ -127,7 +127,7 @@ fn refused_changes(server: &Killable, session: &str) -> usize {
     refused
 }
 
-/// Exports on a full disk fail with a sentence and leave nothing.
+/// Exports on a full disk fail with an error and leave no file.
 fn exports_are_whole_or_absent(disk: &Path, index: &Path) {
     for (kind, name) in [("report.html", "report.html"), ("recording.rrd", "run.rrd")] {
         let out = disk.join(name);
@@ -147,8 +147,8 @@ fn exports_are_whole_or_absent(disk: &Path, index: &Path) {
 }
 
 #[test]
-fn drill_deleted_images_end_a_run_with_a_reason_and_it_goes_on_when_they_are_back() {
-    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+fn drill_deleted_images_end_a_run_until_they_return() {
+    let _exclusive = EXCLUSIVE.lock().unwrap_or_else(PoisonError::into_inner);
     let (drive, data) = (small_recording(), tempfile::tempdir().unwrap());
     let index = std::fs::read_to_string(drive.path().join("traverse.toml")).unwrap();
     let images: Vec<_> = index
@@ -157,14 +157,14 @@ fn drill_deleted_images_end_a_run_with_a_reason_and_it_goes_on_when_they_are_bac
         .map(|name| drive.path().join(name))
         .collect();
     assert!(images.len() >= 10, "{images:?}");
-    let server = Killable::start(drive.path(), data.path());
+    let server = ServerProcess::start(drive.path(), data.path());
     let session = begin(&server, 0);
     until(&server, &format!("sessions/{session}/targets/0/runs/0"), has_ended);
     let rows = server.raw("GET", &format!("sessions/{session}/exports/rows.jsonl"), "", "");
     server.kill();
 
     let (hidden, data) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    let server = Killable::start(drive.path(), data.path());
+    let server = ServerProcess::start(drive.path(), data.path());
     let place = |number: usize| hidden.path().join(number.to_string());
     for (number, image) in images.iter().enumerate().skip(4) {
         std::fs::copy(image, place(number)).unwrap();
@@ -180,7 +180,7 @@ fn drill_deleted_images_end_a_run_with_a_reason_and_it_goes_on_when_they_are_bac
     for (number, image) in images.iter().enumerate().skip(4) {
         std::fs::copy(place(number), image).unwrap();
     }
-    // The steps with damaged files are kept as they were; a fork computes them anew.
+    // The steps with damaged files are stored unchanged; a fork computes them again.
     let fork = json!({ "run": 0, "from_step": 2 });
     server.json("POST", &format!("sessions/{session}/targets/0/runs"), &fork);
     until(&server, &format!("sessions/{session}/targets/0/runs/1"), has_ended);
@@ -189,7 +189,7 @@ fn drill_deleted_images_end_a_run_with_a_reason_and_it_goes_on_when_they_are_bac
     assert_eq!(numbers(&again), numbers(&rows));
     let reason = damaged["rows"][2]["reason"].as_str().unwrap_or_default().to_owned();
     assert!(!reason.is_empty(), "{damaged}");
-    tell(
+    print_row(
         "images deleted and brought back",
         &format!("the image is refused with {status}, the step says why, a fork from it has the former bits"),
     );

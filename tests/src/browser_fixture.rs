@@ -1,4 +1,4 @@
-//! A server with one simulated traverse for tests in a browser, and the first steps there.
+//! A server with one simulated traverse for browser tests, and the first steps on its page.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -20,18 +20,18 @@ use tempfile::TempDir;
 use crate::browser::Browser;
 use crate::server::{TOKEN, access, copy_folder};
 
-/// A server with one traverse, and a rock's pixel in its first left image.
-pub struct Bench {
+/// A server with one traverse, and the pixel of a rock in the first left image.
+pub struct BrowserFixture {
     /// The server's port.
     pub port: u16,
-    /// The rock.
+    /// The rock, px.
     pub rock: Pixel,
-    /// How many stops there are.
+    /// Number of stops.
     pub stop_count: usize,
     _folder: TempDir,
 }
 
-impl Bench {
+impl BrowserFixture {
     /// Serves an approach over `scenario`.
     pub async fn start(scenario: &Scenario) -> Self {
         let folder = rendered(scenario);
@@ -40,7 +40,7 @@ impl Bench {
         Self::serve(traverse, rock, folder, &[]).await
     }
 
-    /// The same, whose page may open the recordings below a folder.
+    /// Like [`Self::start`], but the page may open the recordings below a folder.
     pub async fn with_recordings(scenario: &Scenario, recordings: PathBuf) -> Self {
         let folder = rendered(scenario);
         let traverse = Traverse::open(&folder.path().join("approach")).unwrap();
@@ -48,7 +48,7 @@ impl Bench {
         Self::serve(traverse, rock, folder, &[recordings]).await
     }
 
-    /// Serves the recording in a folder, with a pixel of its first left image at which a rock is.
+    /// Serves the recording in a folder; `rock` is a pixel on a rock in the first left image.
     pub async fn recording(folder: TempDir, rock: Pixel) -> Self {
         Self::serve(Traverse::open(folder.path()).unwrap(), rock, folder, &[]).await
     }
@@ -59,7 +59,7 @@ impl Bench {
         Self { port, rock, stop_count, _folder: folder }
     }
 
-    /// Serves the drive with which a new user begins; its first target is being tracked.
+    /// Serves the drive of a new user, whose first target is already being tracked.
     async fn first_drive(recordings: &[PathBuf]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let scenario = first_session::scenario().unwrap();
@@ -70,12 +70,12 @@ impl Bench {
         Self { port, rock, stop_count, _folder: folder }
     }
 
-    /// The page's address.
+    /// The URL of the page.
     pub fn url(&self) -> String {
         format!("http://127.0.0.1:{}/", self.port)
     }
 
-    /// The body of a GET, read as an old browser would, so that it comes in one piece.
+    /// Returns the body of a GET. The request is HTTP/1.0, so that the body is not chunked.
     pub fn get(&self, path: &str) -> Vec<u8> {
         let mut stream = TcpStream::connect(("127.0.0.1", self.port)).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(300))).unwrap();
@@ -90,60 +90,62 @@ impl Bench {
         answer.split_off(end + 4)
     }
 
-    /// The JSON of a GET.
+    /// Returns the JSON of a GET.
     pub fn json(&self, path: &str) -> Value {
         serde_json::from_slice(&self.get(path)).unwrap()
     }
 
     /// Opens the page and waits for the first image.
     pub async fn open(&self, browser: &Browser) {
-        // Another fragment alone would not load the page again.
+        // A URL that differs only in its fragment does not reload the page.
         browser.goto("about:blank").await;
         browser.goto(&format!("{}#token={TOKEN}", self.url())).await;
         browser.wait_for_viewer().await;
         let shown = "s.phase === 'ready' && s.shown && s.image_to_screen !== null";
-        browser.wait_status("the first image", shown).await;
+        browser.wait_for_status("the first image", shown).await;
     }
 
     /// Opens the page, picks the rock, and waits until its run has reached the last stop.
     pub async fn pick(&self, browser: &Browser) {
         self.open(browser).await;
-        let (x, y) = place(browser, self.rock).await;
+        let (x, y) = canvas_position(browser, self.rock).await;
         browser.press("t").await;
-        browser.wait_status("pick mode", "s.pick_mode").await;
+        browser.wait_for_status("pick mode", "s.pick_mode").await;
         browser.click(x, y).await;
         browser
-            .wait_status("the target, or advice against the place", "s.target === 0 || s.advised_against")
+            .wait_for_status("the target, or advice against the place", "s.target === 0 || s.advised_against")
             .await;
         if browser.status().await["target"] != 0 {
             browser.click_on("button", "Pick anyway").await;
         }
-        browser.wait_status("the target", "s.target === 0").await;
-        browser.wait_status("the run", &format!("s.steps_done === {} && !s.running", self.stop_count)).await;
+        browser.wait_for_status("the target", "s.target === 0").await;
+        browser
+            .wait_for_status("the run", &format!("s.steps_done === {} && !s.running", self.stop_count))
+            .await;
     }
 }
 
 /// A page with a target on the rock of `scenario` whose run has reached the last stop.
-pub async fn picked(scenario: &Scenario) -> (Bench, Browser) {
-    let bench = Bench::start(scenario).await;
+pub async fn picked(scenario: &Scenario) -> (BrowserFixture, Browser) {
+    let fixture = BrowserFixture::start(scenario).await;
     let browser = Browser::start().await;
-    bench.pick(&browser).await;
-    (bench, browser)
+    fixture.pick(&browser).await;
+    (fixture, browser)
 }
 
-/// The page as a new user finds it: the tour's first card over the drive of sixty stops, whose run has ended. The page may
-/// open the recordings below the folders.
-pub async fn first_page(recordings: &[PathBuf]) -> (Bench, Browser) {
-    let bench = Bench::first_drive(recordings).await;
+/// The page of a new user: the first card of the tour over the drive of sixty stops, whose run has ended. The page may open
+/// the recordings below `recordings`.
+pub async fn first_page(recordings: &[PathBuf]) -> (BrowserFixture, Browser) {
+    let fixture = BrowserFixture::first_drive(recordings).await;
     let browser = Browser::start().await;
-    browser.goto(&format!("{}#token={TOKEN}", bench.url())).await;
+    browser.goto(&format!("{}#token={TOKEN}", fixture.url())).await;
     browser.wait_for_viewer().await;
-    browser.wait_status("the first target", "s.target === 0 && s.shown").await;
-    browser.wait_status("the run", "s.steps_done > 1 && !s.running").await;
-    (bench, browser)
+    browser.wait_for_status("the first target", "s.target === 0 && s.shown").await;
+    browser.wait_for_status("the run", "s.steps_done > 1 && !s.running").await;
+    (fixture, browser)
 }
 
-/// Serves a traverse at a port of its own; its sessions are kept in the folder.
+/// Serves a traverse on a free port; its sessions are stored in the folder.
 async fn listen(traverse: Traverse, folder: &TempDir, recordings: &[PathBuf]) -> (u16, AppState) {
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
     let port = listener.local_addr().unwrap().port();
@@ -155,10 +157,10 @@ async fn listen(traverse: Traverse, folder: &TempDir, recordings: &[PathBuf]) ->
     (port, state)
 }
 
-/// A folder with the drive of a scenario in `approach`, a copy of one that all tests share: it is rendered once.
+/// A folder with the drive of a scenario in `approach`: a copy of one that all tests share and that is rendered once.
 fn rendered(scenario: &Scenario) -> TempDir {
     static KEPT: Mutex<Vec<(String, TempDir)>> = Mutex::new(Vec::new());
-    // Whoever panicked here has left nothing half done: a drive is added when it is complete.
+    // A panic leaves the list valid, because a drive is added only when it is complete.
     let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
     let text = scenario.to_toml();
     if !kept.iter().any(|(known, _)| *known == text) {
@@ -175,13 +177,13 @@ fn rendered(scenario: &Scenario) -> TempDir {
     copy
 }
 
-/// The first target that the scenario's rule chooses: on a rock, lit, seen to the end.
+/// The first target that the scenario's rule chooses: on a rock, lit, visible up to the last stop.
 fn rock(scenario: &Scenario, traverse: &Traverse) -> Pixel {
     sightline_world::choose_targets(traverse.world().unwrap(), scenario, traverse.index())[0]
 }
 
-/// Where an image pixel of the left image lies on the canvas, CSS px.
-pub async fn place(browser: &Browser, pixel: Pixel) -> (f64, f64) {
+/// Returns the position of a pixel of the left image on the canvas, CSS px.
+pub async fn canvas_position(browser: &Browser, pixel: Pixel) -> (f64, f64) {
     let status = browser.status().await;
     let map = &status["image_to_screen"];
     let number =

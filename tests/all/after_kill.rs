@@ -1,4 +1,5 @@
-//! What a killed server leaves: rights of its files, exports without a server, and questions that go on.
+//! After the kill of a server: permissions of its files, exports without a server, and counterfactual questions that
+//! continue.
 
 use std::path::Path;
 use std::process::Command;
@@ -8,16 +9,16 @@ use serde_json::json;
 use sightline_tests::server::{PIXEL, small_drive};
 
 use crate::cli::program;
-use crate::keeping::{Killable, PATIENCE};
+use crate::persistence::{PATIENCE, ServerProcess};
 
 #[cfg(unix)]
 #[test]
-fn nobody_else_may_read_what_the_server_keeps() {
+fn stored_files_are_readable_by_the_owner_only() {
     use std::os::unix::fs::PermissionsExt;
     let mode = |path: &Path| std::fs::metadata(path).unwrap().permissions().mode() & 0o777;
     let (drive, home) = (small_drive(), tempfile::tempdir().unwrap());
     let data = home.path().join("data");
-    let server = Killable::start(drive.path(), &data);
+    let server = ServerProcess::start(drive.path(), &data);
     let traverse = server.get("traverses")[0]["id"].clone();
     server.json("POST", "sessions", &json!({ "traverse": traverse }));
     server.kill();
@@ -25,20 +26,20 @@ fn nobody_else_may_read_what_the_server_keeps() {
     let folders = ["sessions", "studies", "traverses", "driven", "digests"].map(|name| data.join(name));
     assert_eq!((mode(&data), mode(&file)), (0o700, 0o600));
     assert_eq!(folders.each_ref().map(|folder| mode(folder)), [0o700; 5]);
-    // As an earlier version left them.
+    // Permissions of an earlier version.
     for (path, wide) in [(&folder, 0o755), (&file, 0o644)] {
         std::fs::set_permissions(path, PermissionsExt::from_mode(wide)).unwrap();
     }
-    let server = Killable::start(drive.path(), &data);
+    let server = ServerProcess::start(drive.path(), &data);
     assert_eq!(server.get("sessions").as_array().map(Vec::len), Some(1));
     assert_eq!((mode(&folder), mode(&file)), (0o700, 0o600));
     server.kill();
 }
 
 #[test]
-fn a_session_of_a_killed_server_is_exported_and_its_file_untouched() {
+fn exporting_from_a_killed_server_leaves_its_file_untouched() {
     let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
-    let server = Killable::start(drive.path(), data.path());
+    let server = ServerProcess::start(drive.path(), data.path());
     let traverse = server.get("traverses")[0]["id"].clone();
     server.json("POST", "sessions", &json!({ "traverse": traverse }));
     let [x, y] = PIXEL;
@@ -57,7 +58,7 @@ fn a_session_of_a_killed_server_is_exported_and_its_file_untouched() {
     assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
     assert_eq!(std::fs::read_to_string(&out).unwrap(), rows);
     assert!(std::fs::read(&file).unwrap() == before, "the database was changed");
-    // Of a damaged one, what can be verified.
+    // Of a damaged file, the parts that can be verified are exported.
     let mut damaged = before;
     damaged[9..4096].fill(0);
     std::fs::write(&file, &damaged).unwrap();
@@ -69,12 +70,12 @@ fn a_session_of_a_killed_server_is_exported_and_its_file_untouched() {
 }
 
 #[test]
-fn a_question_that_the_end_interrupts_is_answered_after_a_restart() {
+fn an_interrupted_question_is_answered_after_a_restart() {
     let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
     let mut answers = Vec::new();
     for is_killed in [false, true] {
         let data = data.path().join(is_killed.to_string());
-        let mut server = Killable::start(drive.path(), &data);
+        let mut server = ServerProcess::start(drive.path(), &data);
         let traverse = server.get("traverses")[0]["id"].clone();
         server.json("POST", "sessions", &json!({ "traverse": traverse }));
         let [x, y] = PIXEL;
@@ -84,11 +85,11 @@ fn a_question_that_the_end_interrupts_is_answered_after_a_restart() {
         server.json("POST", "sessions/s1/targets/0/runs", &lost);
         server.rows(1);
         let path = "sessions/s1/targets/0/runs/1/steps/2/counterfactual";
-        let asked = server.json("POST", path, &json!({}));
-        assert_ne!(asked["state"], json!("done"), "too quick to be interrupted");
+        let question = server.json("POST", path, &json!({}));
+        assert_ne!(question["state"], json!("done"), "too quick to be interrupted");
         if is_killed {
             server.kill();
-            server = Killable::start(drive.path(), &data);
+            server = ServerProcess::start(drive.path(), &data);
         }
         let begun = Instant::now();
         let question = loop {
@@ -100,9 +101,9 @@ fn a_question_that_the_end_interrupts_is_answered_after_a_restart() {
             std::thread::sleep(Duration::from_millis(30));
         };
         answers.push(question["answer"].clone());
-        // Answered, it is there at once.
+        // Once computed, the answer is returned immediately.
         server.kill();
-        let server = Killable::start(drive.path(), &data);
+        let server = ServerProcess::start(drive.path(), &data);
         assert_eq!(server.get(path), question);
         assert_eq!(server.get("health")["notices"], json!([]));
         server.kill();

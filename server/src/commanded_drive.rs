@@ -1,8 +1,8 @@
-//! Drives on commands: the worlds in which sessions drive, each in a folder of its own that grows stop by stop.
+//! Commanded drives: the worlds in which sessions drive. Each has its own folder, which grows stop by stop.
 //!
-//! An open drive is an [`OpenTraverse`] as any other. After each stop it is replaced by one with a stop more, in the list of
-//! open drives and in the sessions on it: who reads the former one is not disturbed. The folder holds the whole state
-//! (`sightline_recordings::driven`), so that the drive goes on after a restart.
+//! An open drive is an ordinary [`OpenTraverse`]. After each stop, one with an additional stop replaces it in the list of
+//! open drives and in its sessions; readers of the old one are not disturbed. The folder contains the whole state
+//! (`sightline_recordings::driven`), so that a drive continues after a restart.
 
 use std::path::Path;
 use std::sync::{Arc, Mutex};
@@ -33,36 +33,36 @@ use crate::rendering::OpenTraverse;
 use crate::rerun_log::DriveLog;
 use crate::shared_world::SharedWorld;
 
-/// The open traverses, those that were opened from a page last.
+/// The open traverses; those opened from a page are last.
 pub(crate) type OpenTraverses = Arc<Mutex<Vec<Arc<OpenTraverse>>>>;
 
-/// The world of a drive on commands.
-pub(crate) struct Driven {
+/// The world of a commanded drive.
+pub(crate) struct CommandedDrive {
     world: Mutex<DrivenTraverse>,
-    /// Hazard maps of the stops; locked before `world`, never while it is held.
+    /// Hazard maps of the stops. Lock order: `maps`, `explained`, `world`.
     maps: Mutex<HazardMaps>,
-    /// Why the drive stopped; locked between these two.
+    /// Why the drive stopped.
     explained: Mutex<Explained>,
     cache: Arc<Cache>,
 }
 
-impl Driven {
-    /// Looks at the world; nobody drives meanwhile.
+impl CommandedDrive {
+    /// Reads the world; the drive is locked meanwhile.
     pub(crate) fn with<T>(&self, look: impl FnOnce(&DrivenTraverse) -> T) -> T {
         look(&lock(&self.world))
     }
 }
 
-/// A new folder for a drive, and the drive's name, which is that of the folder.
+/// Creates a new folder for a drive and returns it; the name of the drive is that of the folder.
 ///
 /// # Errors
-/// A folder that cannot be made.
+/// A folder that cannot be created.
 pub(crate) fn new_folder(folders: &Folders, name: &str) -> Result<std::path::PathBuf> {
     let write = |path: &Path, source| Error::Write { path: path.to_owned(), source };
-    make_private(&folders.driven).map_err(|source| write(&folders.driven, source))?;
+    make_private(&folders.commanded_drives).map_err(|source| write(&folders.commanded_drives, source))?;
     let mut number = 1;
     loop {
-        let folder = folders.driven.join(format!("{}-driven-{number}", slug(name)));
+        let folder = folders.commanded_drives.join(format!("{}-driven-{number}", slug(name)));
         match std::fs::create_dir(&folder) {
             Ok(()) => return Ok(folder),
             Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => number += 1,
@@ -71,7 +71,7 @@ pub(crate) fn new_folder(folders: &Folders, name: &str) -> Result<std::path::Pat
     }
 }
 
-/// Opens the world of a drive under the name of its folder.
+/// Opens the world of a drive with the name of its folder.
 ///
 /// # Errors
 /// A folder that cannot be read.
@@ -82,23 +82,23 @@ pub(crate) fn open(
 ) -> Result<OpenTraverse> {
     let traverse = world.snapshot()?.with_cache(cache);
     let name = traverse.folder().file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let driven = Arc::new(Driven {
+    let drive = Arc::new(CommandedDrive {
         world: Mutex::new(world),
         maps: Mutex::default(),
         explained: Mutex::default(),
         cache: Arc::clone(cache),
     });
-    Ok(OpenTraverse::new(Identity::driven(name), traverse, events.clone()).driven_in(driven))
+    Ok(OpenTraverse::new(Identity::of_commanded_drive(name), traverse, events.clone()).in_world_of(drive))
 }
 
-/// Opens the drives of earlier starts; what cannot be opened is said in one sentence each.
-pub(crate) fn open_again(
+/// Reopens the drives of earlier starts; returns one sentence for each that cannot be opened.
+pub(crate) fn reopen(
     folders: &Folders,
     cache: &Arc<Cache>,
     open: &mut Vec<Arc<OpenTraverse>>,
     events: &broadcast::Sender<Event>,
 ) -> Vec<String> {
-    let entries = std::fs::read_dir(&folders.driven).into_iter().flatten().flatten();
+    let entries = std::fs::read_dir(&folders.commanded_drives).into_iter().flatten().flatten();
     let mut all: Vec<_> = entries.map(|entry| entry.path()).filter(|path| path.is_dir()).collect();
     all.sort();
     let mut lost = Vec::new();
@@ -123,7 +123,7 @@ pub(crate) fn copy(from: &Path, to: &Path) -> Result<()> {
     std::fs::create_dir_all(to).map_err(failed)?;
     for entry in std::fs::read_dir(from).map_err(failed)?.flatten() {
         let (path, copied) = (entry.path(), to.join(entry.file_name()));
-        // Kept radiance is only time.
+        // The cached radiance is not copied: it can be rendered again.
         if path.is_dir() && entry.file_name() != "cache" {
             copy(&path, &copied)?;
         } else if path.is_file() {
@@ -133,40 +133,48 @@ pub(crate) fn copy(from: &Path, to: &Path) -> Result<()> {
     Ok(())
 }
 
-/// What became of a drive to another stop.
-pub(crate) enum DrivenOn {
-    /// The drive with a stop more.
+/// Result of driving to the next stop.
+pub(crate) enum DriveOutcome {
+    /// The drive with an additional stop.
     Grown(Arc<OpenTraverse>),
-    /// It ends at the last stop.
+    /// The drive ended at the last stop.
     Ended(Ending),
-    /// Somebody else drove on from there.
-    Overtaken,
+    /// Another request has already driven on from this stop.
+    AlreadyDriven,
 }
 
-/// Drives from the last stop to the next on the estimates of `steps`. The mast is pointed and the images are due if no pause is
-/// before.
+/// Drives from the last stop to the next on the estimates of `steps`. Points the mast and renders the images there unless a
+/// pause comes first.
 ///
 /// # Errors
-/// A drive that is none on commands, ground that cannot be driven on, a folder that cannot be written, or
-/// [`Error::Cancelled`]; the world is then as it was.
-pub(crate) fn drive_on(
+/// A drive that is not commanded, impassable ground, a folder that cannot be written, or [`Error::Cancelled`]; the world is
+/// then unchanged.
+pub(crate) fn drive_to_next_stop(
     open: &OpenTraverse,
     steering: &Steering,
     steps: &[Arc<RunStep>],
     cancel: &CancelFlag,
-) -> Result<DrivenOn> {
-    let Some(driven) = &open.driven else {
+) -> Result<DriveOutcome> {
+    let Some(drive) = &open.commanded else {
         let problem = "this drive was planned or recorded before; it is replayed and cannot be driven on";
         return Err(Error::Request(problem.to_owned()));
     };
-    let (Some(first), Some(last)) = (steps.first(), steps.last()) else { return Ok(DrivenOn::Overtaken) };
+    let (Some(first), Some(last)) = (steps.first(), steps.last()) else {
+        return Ok(DriveOutcome::AlreadyDriven);
+    };
     let (command, navigator) = (&steering.command, &*steering.command.navigator.navigator());
-    let mut maps = lock(&driven.maps);
-    // Images may have to be rendered: the world is free meanwhile.
-    map_hazards(open, command, (first, undecided(driven, steps)), &mut maps, cancel.as_ref().into())?;
-    let mut world = lock(&driven.world);
+    let mut maps = lock(&drive.maps);
+    // May render images, so the world is not locked yet.
+    compute_hazard_maps(
+        open,
+        command,
+        (first, steps_without_decision(drive, steps)),
+        &mut maps,
+        cancel.as_ref().into(),
+    )?;
+    let mut world = lock(&drive.world);
     if world.traverse().stop_count() != last.step + 1 {
-        return Ok(DrivenOn::Overtaken);
+        return Ok(DriveOutcome::AlreadyDriven);
     }
     let before = driving::cycle_before(&world, command, &steps[..steps.len() - 1], &mut maps);
     let hazards = maps.at(world.traverse(), command, [&first.trace, &last.trace], cancel.as_ref().into())?;
@@ -184,32 +192,32 @@ pub(crate) fn drive_on(
     let moved = executive::drive(&mut *world, &input, cancel.as_ref().into());
     drop(world);
     let prepared = match moved {
-        Ok(Cycle { ending: Some(ending), .. }) => return Ok(DrivenOn::Ended(ending)),
-        Ok(_) => prepare_stop(driven, last, &steering.command, before, cancel),
+        Ok(Cycle { ending: Some(ending), .. }) => return Ok(DriveOutcome::Ended(ending)),
+        Ok(_) => prepare_stop(drive, last, &steering.command, before, cancel),
         Err(error) => Err(error),
     };
-    let mut world = lock(&driven.world);
+    let mut world = lock(&drive.world);
     if let Err(error) = prepared {
         world.restore(state)?;
         return Err(error);
     }
-    let traverse = world.snapshot()?.with_cache(&driven.cache);
+    let traverse = world.snapshot()?.with_cache(&drive.cache);
     drop(world);
-    Ok(DrivenOn::Grown(Arc::new(open.grown(traverse))))
+    Ok(DriveOutcome::Grown(Arc::new(open.grown(traverse))))
 }
 
-/// The last steps of a run, from the first that the rover has not driven on from.
-fn undecided<'a>(driven: &Driven, steps: &'a [Arc<RunStep>]) -> &'a [Arc<RunStep>] {
+/// The last steps of a run, starting with the first from which the rover has not driven on.
+fn steps_without_decision<'a>(drive: &CommandedDrive, steps: &'a [Arc<RunStep>]) -> &'a [Arc<RunStep>] {
     let count =
-        driven.with(|world| steps.iter().take_while(|step| world.followed(step.step).is_some()).count());
+        drive.with(|world| steps.iter().take_while(|step| world.followed(step.step).is_some()).count());
     &steps[count..]
 }
 
-/// Computes the hazard maps of a run's `steps` that are missing, without the world; its first step is that of the designation.
+/// Computes the missing hazard maps of a run's `steps` without locking the world; `first` is the step of the designation.
 ///
 /// # Errors
 /// [`Error::Cancelled`].
-fn map_hazards(
+fn compute_hazard_maps(
     open: &OpenTraverse,
     command: &DriveCommand,
     (first, steps): (&RunStep, &[Arc<RunStep>]),
@@ -221,11 +229,11 @@ fn map_hazards(
         .try_for_each(|step| maps.at(&open.traverse, command, [&first.trace, &step.trace], cancel).map(drop))
 }
 
-/// Points the mast at the last stop and lets its images be taken, as far as no pause is before; returns the drive as it is then.
-/// `None` if nothing was put off there.
+/// Points the mast and captures the images at the last stop, up to the next pause; returns the resulting drive, or `None` if
+/// nothing was pending there.
 ///
 /// # Errors
-/// A folder that cannot be written, or [`Error::Cancelled`]; the world is then as it was.
+/// A folder that cannot be written, or [`Error::Cancelled`]; the world is then unchanged.
 pub(crate) fn prepare(
     open: &OpenTraverse,
     last: &RunStep,
@@ -233,27 +241,27 @@ pub(crate) fn prepare(
     before: Option<CycleStage>,
     cancel: &CancelFlag,
 ) -> Result<Option<Arc<OpenTraverse>>> {
-    let Some(driven) = &open.driven else { return Ok(None) };
-    let world = lock(&driven.world);
+    let Some(drive) = &open.commanded else { return Ok(None) };
+    let world = lock(&drive.world);
     if world.traverse().stop_count() != last.step + 2 || world.awaits().is_none() {
         return Ok(None);
     }
     let state = world.state().to_vec();
     drop(world);
-    let prepared = prepare_stop(driven, last, command, before, cancel);
-    let mut world = lock(&driven.world);
+    let prepared = prepare_stop(drive, last, command, before, cancel);
+    let mut world = lock(&drive.world);
     if let Err(error) = prepared {
         world.restore(state)?;
         return Err(error);
     }
-    let traverse = world.snapshot()?.with_cache(&driven.cache);
+    let traverse = world.snapshot()?.with_cache(&drive.cache);
     Ok(Some(Arc::new(open.grown(traverse))))
 }
 
-/// The world's part of `point_mast` and `capture` at the last stop, as far as no pause is before. Others may look at the world
-/// while images are rendered and vision measures the motion.
+/// Performs `point_mast` and `capture` at the last stop in the world, up to the next pause. The world is readable while
+/// images are rendered and visual odometry runs.
 fn prepare_stop(
-    driven: &Driven,
+    drive: &CommandedDrive,
     last: &RunStep,
     command: &DriveCommand,
     before: Option<CycleStage>,
@@ -261,26 +269,26 @@ fn prepare_stop(
 ) -> Result<()> {
     let reaches = |stage| before.is_none_or(|before| before > stage);
     let step = last.step + 1;
-    // Images that are put off show the mast as it was pointed then.
-    let is_pointed = lock(&driven.world).awaits() == Some(CycleStage::Capture);
-    let is_alone = lock(&driven.world).traverse().is_odometry_alone(step);
+    // Pending images are captured with the mast angles already set.
+    let is_pointed = lock(&drive.world).awaits() == Some(CycleStage::Capture);
+    let is_alone = lock(&drive.world).traverse().is_odometry_alone(step);
     let odometry = || {
-        let mut shared = SharedWorld::new(&driven.world, &driven.cache)?;
+        let mut shared = SharedWorld::new(&drive.world, &drive.cache)?;
         odometry::run(&mut shared, command, step, cancel.as_ref().into())
     };
     if !is_pointed {
-        // After a restart the drive goes on from here.
-        lock(&driven.world).put_off(Some(CycleStage::PointMast))?;
+        // After a restart the drive resumes here.
+        lock(&drive.world).put_off(Some(CycleStage::PointMast))?;
         if !reaches(CycleStage::PointMast) {
             return Ok(());
         }
         if command.odometry_pair == OdometryPair::Own {
             odometry()?;
             if is_alone {
-                return lock(&driven.world).put_off(None);
+                return lock(&drive.world).put_off(None);
             }
         }
-        let mut world = lock(&driven.world);
+        let mut world = lock(&drive.world);
         executive::point_mast(&mut *world, command, &last.update)?;
         world.put_off(Some(CycleStage::Capture))?;
     }
@@ -288,11 +296,11 @@ fn prepare_stop(
         return Ok(());
     }
     odometry()?;
-    lock(&driven.world).put_off(None)
+    lock(&drive.world).put_off(None)
 }
 
-/// Who drives in a session, with its run.
-fn steered(live: &LiveSession) -> (Option<Steering>, Option<Run>) {
+/// The steering of a session and the run that it follows.
+fn steering_run(live: &LiveSession) -> (Option<Steering>, Option<Run>) {
     live.with(|session| {
         let steering = session.steering.clone();
         let run = steering.as_ref().and_then(|to| session.run(to.target, to.run).ok().cloned());
@@ -300,42 +308,42 @@ fn steered(live: &LiveSession) -> (Option<Steering>, Option<Run>) {
     })
 }
 
-/// The drive of a session.
+/// The view of a session's drive.
 pub(crate) fn view(live: &LiveSession) -> DriveView {
-    let (steering, run) = steered(live);
-    // Read after the run: it has the stops of all its steps.
+    let (steering, run) = steering_run(live);
+    // Read after the run, so that it has the stops of all the run's steps.
     let open = live.traverse();
-    let (Some(steering), Some(driven)) = (&steering, &open.driven) else {
+    let (Some(steering), Some(drive)) = (&steering, &open.commanded) else {
         return DriveView { steering, ..DriveView::default() };
     };
     let Some(run) = run else {
         return DriveView { steering: Some(steering.clone()), ..DriveView::default() };
     };
     let is_driving = live.is_computing(steering.target, steering.run);
-    let mut maps = lock(&driven.maps);
+    let mut maps = lock(&drive.maps);
     let steps = run.whole_steps();
     if let Some(first) = steps.first() {
-        let missing = (first.as_ref(), undecided(driven, steps));
+        let missing = (first.as_ref(), steps_without_decision(drive, steps));
         // Never cancelled.
-        let _mapped = map_hazards(&open, &steering.command, missing, &mut maps, Cancel::default());
+        let _mapped = compute_hazard_maps(&open, &steering.command, missing, &mut maps, Cancel::default());
     }
-    let mut explained = lock(&driven.explained);
+    let mut explained = lock(&drive.explained);
     let found =
-        driven.with(|world| DriveView::of(world, steering, &run, (&mut maps, &mut explained), is_driving));
+        drive.with(|world| DriveView::of(world, steering, &run, (&mut maps, &mut explained), is_driving));
     DriveView { visits: live.with(|session| session.visits.clone()), ..found }
 }
 
-/// The drive of a session as a Rerun recording has it, with the hazard maps that are kept; `None` where nobody drives.
+/// The drive of a session for a Rerun recording, with the stored hazard maps; `None` if the session is not steered.
 pub(crate) fn log(live: &LiveSession) -> Option<DriveLog> {
     let DriveView { steering, cycles, why, .. } = view(live);
     let command = steering?.command;
     let open = live.traverse();
-    let driven = open.driven.as_ref()?;
-    let (_, run) = steered(live);
+    let drive = open.commanded.as_ref()?;
+    let (_, run) = steering_run(live);
     let run = run?;
     let steps = run.whole_steps();
     let first = steps.first()?;
-    let mut maps = lock(&driven.maps);
+    let mut maps = lock(&drive.maps);
     let hazards = steps.iter().map_while(|step| {
         let pair = [&first.trace, &step.trace];
         maps.at(&open.traverse, &command, pair, Cancel::default()).ok().flatten()
@@ -347,12 +355,12 @@ pub(crate) fn log(live: &LiveSession) -> Option<DriveLog> {
 /// The goodness map at a stop of the drive of a session.
 ///
 /// # Errors
-/// A problem for a session without a drive, a navigator without a map, and a step that the drive has not come to.
+/// A problem for a session without a commanded drive, a navigator without a map, and a step that the drive has not reached.
 pub(crate) fn hazards(live: &LiveSession, step: usize, cancel: &CancelFlag) -> ApiResult<HazardView> {
-    let (steering, run) = steered(live);
-    // Read after the run: it has the stops of all its steps.
+    let (steering, run) = steering_run(live);
+    // Read after the run, so that it has the stops of all the run's steps.
     let open = live.traverse();
-    let (Some(steering), Some(driven)) = (steering, &open.driven) else {
+    let (Some(steering), Some(drive)) = (steering, &open.commanded) else {
         return Err(ApiError::conflict("The drive of this session is not on commands."));
     };
     let (command, navigator) = (&steering.command, steering.command.navigator);
@@ -364,9 +372,10 @@ pub(crate) fn hazards(live: &LiveSession, step: usize, cancel: &CancelFlag) -> A
     let (Some(first), Some(last)) = (steps.first(), steps.iter().find(|known| known.step == step)) else {
         return Err(ApiError::not_found(format!("The drive has not come to step {step}.")));
     };
-    let mut maps = lock(&driven.maps);
-    // The maps of all stops, in order: only the last one can be computed from what is kept, and the page also shows earlier ones.
-    map_hazards(&open, command, (first, steps), &mut maps, cancel.as_ref().into())?;
+    let mut maps = lock(&drive.maps);
+    // Computes the maps of all stops in order, because only the last one can be computed from stored data and the page also
+    // shows earlier ones.
+    compute_hazard_maps(&open, command, (first, steps), &mut maps, cancel.as_ref().into())?;
     let found = maps.at(&open.traverse, command, [&first.trace, &last.trace], cancel.as_ref().into())?;
     drop(maps);
     let none =
@@ -374,9 +383,9 @@ pub(crate) fn hazards(live: &LiveSession, step: usize, cancel: &CancelFlag) -> A
     found.map(|hazards| HazardView::of(&hazards)).ok_or_else(none)
 }
 
-/// Puts the drive with a stop more in the place of the former one in the list of open drives.
+/// Replaces a drive in the list of open drives by the one with an additional stop.
 pub(crate) fn replace(traverses: &OpenTraverses, grown: &Arc<OpenTraverse>) {
-    if let Some(place) = lock(traverses).iter_mut().find(|open| open.id == grown.id) {
-        *place = Arc::clone(grown);
+    if let Some(slot) = lock(traverses).iter_mut().find(|open| open.id == grown.id) {
+        *slot = Arc::clone(grown);
     }
 }

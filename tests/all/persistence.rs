@@ -1,4 +1,4 @@
-//! What survives a server that is killed, and what people write and keep: sessions, notes, documents.
+//! Data that survive the kill of a server, and user data: sessions, notes, documents.
 
 use std::ffi::OsStr;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -13,33 +13,33 @@ use sightline_tests::server::{PIXEL, TOKEN, TestServer, request, small_drive};
 
 use crate::cli::program;
 
-/// How long a test waits for a run.
+/// Maximum time for a run.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(180);
 
-/// The program itself, serving a drive.
-pub(crate) struct Killable {
+/// The program, serving a drive.
+pub(crate) struct ServerProcess {
     child: Child,
     /// Host and port.
     pub address: String,
 }
 
-impl Killable {
-    /// Serves at any free port.
+impl ServerProcess {
+    /// Serves on any free port.
     pub(crate) fn start(drive: &Path, data: &Path) -> Self {
         Self::start_at("0", drive, data)
     }
 
-    /// Serves at a port; 0 is any free one.
+    /// Serves on a port; 0 is any free one.
     pub(crate) fn start_at(port: &str, drive: &Path, data: &Path) -> Self {
         Self::run(port, &[], drive, data)
     }
 
-    /// Serves with variables in its environment.
+    /// Serves with additional environment variables.
     pub(crate) fn start_with(environment: &[(&str, &OsStr)], drive: &Path, data: &Path) -> Self {
         Self::run("0", environment, drive, data)
     }
 
-    /// Serves with few descriptors and moved limits (`NAME=VALUE`).
+    /// Serves with a limited number of descriptors and changed limits (`NAME=VALUE`).
     #[cfg(unix)]
     pub(crate) fn start_bounded(descriptors: u32, limits: &[&str], drive: &Path, data: &Path) -> Self {
         let mut shell = Command::new("sh");
@@ -54,7 +54,7 @@ impl Killable {
         Self::serve(program, port, drive, data)
     }
 
-    /// Starts the program that `program` ends with, and waits until it serves.
+    /// Starts the command `program`, completed by port and folders, and waits until it serves.
     fn serve(mut program: Command, port: &str, drive: &Path, data: &Path) -> Self {
         program.args([drive.to_str().unwrap(), "--port", port, "--data-dir", data.to_str().unwrap()]);
         program.env("SIGHTLINE_TOKEN", TOKEN);
@@ -72,17 +72,17 @@ impl Killable {
         &mut self.child
     }
 
-    /// The number of the process.
+    /// The process id.
     pub(crate) fn id(&self) -> u32 {
         self.child.id()
     }
 
-    /// SIGKILL, as the system does it when there is no memory: nothing can be said or written any more.
+    /// SIGKILL, as sent by the system when memory is exhausted: the program can write nothing more.
     pub(crate) fn kill(self) {
         drop(self);
     }
 
-    /// Sends a request and does not wait for its answer.
+    /// Sends a request without waiting for its response.
     pub(crate) fn open(&self, method: &str, path: &str, headers: &str, body: &str) -> TcpStream {
         let mut stream = TcpStream::connect(&self.address).unwrap();
         let length = body.len();
@@ -97,7 +97,7 @@ impl Killable {
         stream
     }
 
-    /// Status, head and body of the answer.
+    /// Status, head and body of the response.
     fn whole(&self, method: &str, path: &str, headers: &str, body: &str) -> (u16, String, Vec<u8>) {
         let mut answer = Vec::new();
         self.open(method, path, headers, body).read_to_end(&mut answer).unwrap();
@@ -107,13 +107,13 @@ impl Killable {
         (head.split(' ').nth(1).unwrap().parse().unwrap(), head, body)
     }
 
-    /// Status and body of the answer.
+    /// Status and body of the response.
     pub(crate) fn answer(&self, method: &str, path: &str, headers: &str, body: &str) -> (u16, String) {
         let (status, _, body) = self.whole(method, path, headers, body);
         (status, String::from_utf8_lossy(&body).into_owned())
     }
 
-    /// The body of an answer that grants the request.
+    /// The body of a successful response.
     pub(crate) fn raw(&self, method: &str, path: &str, headers: &str, body: &str) -> String {
         let (status, head, body) = self.whole(method, path, headers, body);
         let body = String::from_utf8_lossy(&body).into_owned();
@@ -121,14 +121,14 @@ impl Killable {
         body
     }
 
-    /// A file.
+    /// The bytes of a file.
     pub(crate) fn bytes(&self, path: &str) -> Vec<u8> {
         let (status, head, body) = self.whole("GET", path, "", "");
         assert_eq!(status, 200, "{path}: {head}");
         body
     }
 
-    /// The JSON of an answer that grants the request; null for none.
+    /// The JSON of a successful response; null without a body.
     pub(crate) fn json(&self, method: &str, path: &str, body: &Value) -> Value {
         let body = if body.is_null() { String::new() } else { body.to_string() };
         serde_json::from_str(&self.raw(method, path, "", &body)).unwrap_or(Value::Null)
@@ -139,7 +139,7 @@ impl Killable {
         self.json("GET", path, &Value::Null)
     }
 
-    /// Waits until a run has ended; its rows as text.
+    /// Waits until a run has ended; returns its rows as text.
     pub(crate) fn rows(&self, run: u64) -> String {
         let begun = Instant::now();
         loop {
@@ -158,7 +158,7 @@ impl Killable {
     }
 }
 
-impl Drop for Killable {
+impl Drop for ServerProcess {
     fn drop(&mut self) {
         self.child.kill().unwrap();
         self.child.wait().unwrap();
@@ -166,9 +166,9 @@ impl Drop for Killable {
 }
 
 #[test]
-fn a_killed_server_has_lost_nothing_and_computes_the_same_rows_bit_for_bit() {
+fn a_killed_server_restores_the_same_rows_bit_for_bit() {
     let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
-    let server = Killable::start(drive.path(), data.path());
+    let server = ServerProcess::start(drive.path(), data.path());
     let traverse = server.get("traverses")[0]["id"].clone();
     server.json("POST", "sessions", &json!({ "traverse": traverse }));
     let [x, y] = PIXEL;
@@ -187,15 +187,15 @@ fn a_killed_server_has_lost_nothing_and_computes_the_same_rows_bit_for_bit() {
     assert_eq!(notes.as_array().map(Vec::len), Some(2), "{notes}");
     let cursor = json!({ "target": 0, "run": 1, "step": 4 });
     server.json("PUT", "sessions/s1/cursor", &cursor);
-    // A cursor may be lost that moved within the last second; this one moved before.
+    // A cursor move of the last second may be lost; this one was earlier.
     std::thread::sleep(Duration::from_millis(1100));
-    // A third run is killed in the middle.
+    // A third run is killed before its end.
     let third = json!({ "run": 0, "from_step": 0, "settings": { "template_size_px": 17 } });
     server.json("POST", "sessions/s1/targets/0/runs", &third);
     let before = server.get("sessions/s1");
     server.kill();
 
-    let server = Killable::start(drive.path(), data.path());
+    let server = ServerProcess::start(drive.path(), data.path());
     assert_eq!(server.get("health")["notices"], json!([]));
     assert_eq!(server.rows(0), first);
     assert_eq!(server.rows(1), second);
@@ -217,11 +217,11 @@ fn a_killed_server_has_lost_nothing_and_computes_the_same_rows_bit_for_bit() {
 }
 
 #[test]
-fn a_server_that_is_killed_while_it_writes_has_everything_that_it_confirmed() {
+fn a_server_killed_while_writing_keeps_confirmed_changes() {
     let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
     let mut confirmed = 0;
     for round in 0..4 {
-        let server = Killable::start(drive.path(), data.path());
+        let server = ServerProcess::start(drive.path(), data.path());
         assert_eq!(server.get("health")["notices"], json!([]), "round {round}");
         if round == 0 {
             let traverse = server.get("traverses")[0]["id"].clone();
@@ -229,22 +229,22 @@ fn a_server_that_is_killed_while_it_writes_has_everything_that_it_confirmed() {
             server.json("POST", "sessions/s1/notes", &json!({ "step": 0, "text": "0" }));
         }
         let note = server.get("sessions/s1/notes/1");
-        let kept: u64 = note["text"].as_str().unwrap().parse().unwrap();
-        assert!(kept >= confirmed, "round {round}: {kept} was kept, and {confirmed} confirmed");
-        assert!(kept <= confirmed + 1, "round {round}: {kept} was never asked for");
-        // Another thread writes without a pause, until the server is killed in the middle of it.
+        let stored: u64 = note["text"].as_str().unwrap().parse().unwrap();
+        assert!(stored >= confirmed, "round {round}: {stored} was kept, and {confirmed} confirmed");
+        assert!(stored <= confirmed + 1, "round {round}: {stored} was never asked for");
+        // Another thread writes continuously until the server is killed.
         let address = server.address.clone();
-        let writer = std::thread::spawn(move || write_until_it_fails(&address, kept));
+        let writer = std::thread::spawn(move || write_until_it_fails(&address, stored));
         std::thread::sleep(Duration::from_millis(400 + 90 * round));
         server.kill();
         confirmed = writer.join().unwrap();
-        assert!(confirmed > kept, "round {round}: nothing was written, so that nothing is tested");
+        assert!(confirmed > stored, "round {round}: nothing was written, so that nothing is tested");
     }
 }
 
-/// Writes one number after the other into the first note; the last one that was confirmed.
-fn write_until_it_fails(address: &str, kept: u64) -> u64 {
-    let mut confirmed = kept;
+/// Writes increasing numbers into the first note; returns the last one that was confirmed.
+fn write_until_it_fails(address: &str, stored: u64) -> u64 {
+    let mut confirmed = stored;
     loop {
         let body = json!({ "text": (confirmed + 1).to_string() }).to_string();
         let Ok(mut stream) = TcpStream::connect(address) else { return confirmed };
@@ -266,29 +266,29 @@ fn write_until_it_fails(address: &str, kept: u64) -> u64 {
 #[test]
 fn an_orderly_end_keeps_the_cursor_that_has_just_moved() {
     let drive = small_drive();
-    // The system's end, a closed terminal, and Ctrl-C.
+    // Shutdown of the system, a closed terminal, and Ctrl-C.
     for signal in ["-TERM", "-HUP", "-INT"] {
         let data = tempfile::tempdir().unwrap();
-        let mut server = Killable::start(drive.path(), data.path());
+        let mut server = ServerProcess::start(drive.path(), data.path());
         let traverse = server.get("traverses")[0]["id"].clone();
         server.json("POST", "sessions", &json!({ "traverse": traverse }));
         server.json("PUT", "sessions/s1/cursor", &json!({ "target": null, "run": 0, "step": 3 }));
         let pid = server.child.id().to_string();
         assert!(Command::new("kill").args([signal, &pid]).status().unwrap().success());
         assert!(server.child.wait().unwrap().success(), "{signal}");
-        let server = Killable::start(drive.path(), data.path());
+        let server = ServerProcess::start(drive.path(), data.path());
         assert_eq!(server.get("sessions/s1")["cursor"]["step"], json!(3), "{signal}");
         server.kill();
     }
 }
 
 #[test]
-fn a_damaged_database_is_moved_aside_with_a_sentence_and_the_server_starts() {
+fn a_damaged_database_is_moved_aside_with_a_notice() {
     let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
     let folder = data.path().join("sessions");
     std::fs::create_dir_all(&folder).unwrap();
     std::fs::write(folder.join("sessions.redb"), b"these are not the bytes of a database").unwrap();
-    let server = Killable::start(drive.path(), data.path());
+    let server = ServerProcess::start(drive.path(), data.path());
     let notices = server.get("health")["notices"].to_string();
     assert!(
         notices.contains("sessions.redb is damaged") && notices.contains("sessions.redb.damaged"),

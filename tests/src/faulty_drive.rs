@@ -1,4 +1,4 @@
-//! A simulated drive on which things go wrong at chosen stops: an image is missing, or both eyes are covered.
+//! A simulated drive with faults at chosen stops: an image is missing, or both cameras are covered.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -16,20 +16,20 @@ use sightline_vision::image::GrayImage;
 use sightline_world::target_truth::TruthSource;
 use sightline_world::{Scenario, choose_targets};
 
-/// A simulated drive with trouble.
-pub struct Troubled {
-    /// The drive as it was simulated.
+/// A simulated drive with faults.
+pub struct FaultyDrive {
+    /// The drive.
     pub traverse: Traverse,
     /// Stops whose left image is missing.
     pub missing: Vec<usize>,
-    /// Stops at which both images are one grey.
+    /// Stops at which both images are a uniform grey.
     pub covered: Vec<usize>,
-    /// Targets by the scenario's own rule, px of the first left image.
+    /// Targets by the scenario's rule, px of the first left image.
     pub targets: Vec<Pixel>,
 }
 
-impl Troubled {
-    /// The drive of a scenario, in an empty folder.
+impl FaultyDrive {
+    /// Simulates the drive of a scenario in an empty folder.
     pub fn simulate(scenario: &Scenario, folder: &Path) -> Self {
         let traverse = create_simulated(scenario, folder).expect("the scenario makes a traverse");
         let world = traverse.world().expect("a simulated traverse has a world");
@@ -37,13 +37,13 @@ impl Troubled {
         Self { traverse, missing: Vec::new(), covered: Vec::new(), targets }
     }
 
-    /// A drive of few stops and small images, which renders in about a second a stop.
+    /// Simulates a drive of few stops and small images; rendering takes about a second per stop.
     pub fn short(folder: &Path) -> Self {
         Self::simulate(&short_scenario(), folder)
     }
 }
 
-/// The scenario of [`Troubled::short`].
+/// The scenario of [`FaultyDrive::short`].
 pub(crate) fn short_scenario() -> Scenario {
     let mut scenario = Scenario { name: "short approach".to_owned(), ..Scenario::default() };
     scenario.camera.image_size = 512;
@@ -55,7 +55,7 @@ pub(crate) fn short_scenario() -> Scenario {
     scenario
 }
 
-impl Stops for Troubled {
+impl Stops for FaultyDrive {
     fn stop_count(&self) -> usize {
         Stops::stop_count(&self.traverse)
     }
@@ -99,7 +99,7 @@ impl Stops for Troubled {
     }
 }
 
-impl TruthSource for Troubled {
+impl TruthSource for FaultyDrive {
     fn true_site_from_rover(&self, step: usize) -> Option<Pose> {
         TruthSource::true_site_from_rover(&self.traverse, step)
     }

@@ -1,7 +1,7 @@
-//! The border to rerun: pixels, points, poses, covariances and images as its archetypes take them.
+//! Conversions to rerun: pixels, points, poses, covariances and images as archetypes.
 //!
-//! Ours has (0, 0) at the *centre* of the first pixel; rerun's 2-D space has it at that pixel's top left
-//! *corner*. [`point`] adds the half pixel and is the only place that does.
+//! In Sightline, (0, 0) is the *centre* of the first pixel; in rerun's 2-D space it is that pixel's top left *corner*. Only
+//! [`point`] adds the half pixel.
 
 use std::io::Cursor;
 
@@ -17,15 +17,15 @@ use sightline_vision::image::{GrayImage, PixelRect};
 
 use super::palette::{HALO, Rgb, color};
 
-/// Points of a drawn ellipse.
+/// Points on a drawn ellipse.
 const ELLIPSE_POINTS: u32 = 64;
 
-/// A position of ours in rerun's 2-D space, px.
+/// Converts a position to rerun's 2-D space, px.
 pub(super) fn point(pixel: Pixel) -> [f32; 2] {
     [(pixel.x + 0.5) as f32, (pixel.y + 0.5) as f32]
 }
 
-/// A difference of two positions, px: here there is no half pixel to add.
+/// Converts a difference of two positions, px, without the half pixel.
 pub(super) fn vector(along: &Vector2<f64>) -> [f32; 2] {
     [along.x as f32, along.y as f32]
 }
@@ -55,7 +55,7 @@ pub(super) fn dot_3d(at: Point3, rgb: Rgb, label: &str) -> Points3D {
         .with_show_labels(false)
 }
 
-/// Lines on an image, each on a black halo so that it reads on any rock.
+/// Lines on an image, each with a black halo, so that they are visible on any background.
 pub(super) fn haloed(strips: &[Vec<[f32; 2]>], rgb: Rgb) -> LineStrips2D {
     let repeated = |under: Color, over: Color| {
         strips.iter().map(move |_| under).chain(strips.iter().map(move |_| over)).collect::<Vec<_>>()
@@ -67,7 +67,7 @@ pub(super) fn haloed(strips: &[Vec<[f32; 2]>], rgb: Rgb) -> LineStrips2D {
         .with_draw_order(20.0)
 }
 
-/// The outline through `corners`, closed.
+/// The closed outline through `corners`.
 pub(super) fn outline(corners: impl IntoIterator<Item = Pixel>) -> Vec<[f32; 2]> {
     let mut strip: Vec<_> = corners.into_iter().map(point).collect();
     strip.extend(strip.first().copied());
@@ -80,7 +80,7 @@ pub(super) fn plus(centre: Pixel, arm: f64) -> [Vec<[f32; 2]>; 2] {
     [stroke(arm, 0.0), stroke(0.0, arm)]
 }
 
-/// The ellipse at `sigmas` standard deviations; none when the covariance is not finite.
+/// The ellipse at `sigmas` standard deviations; `None` if the covariance is not finite.
 pub(super) fn ellipse(centre: Pixel, covariance_px2: &Matrix2<f64>, sigmas: f64) -> Option<Vec<[f32; 2]>> {
     if !covariance_px2.iter().all(|v| v.is_finite()) {
         return None;
@@ -100,7 +100,7 @@ pub(super) fn point_3d(at: &Point3) -> [f32; 3] {
     [at.x as f32, at.y as f32, at.z as f32]
 }
 
-/// A rigid motion as the transform of the entity whose frame it moves.
+/// A rigid transform as the transform of the child entity.
 pub(super) fn transform(parent_from_child: &Pose) -> Transform3D {
     let t = parent_from_child.translation.vector;
     Transform3D::from_translation_rotation(
@@ -113,7 +113,7 @@ fn quaternion(rotation: &UnitQuaternion<f64>) -> rerun::Quaternion {
     rerun::Quaternion::from_xyzw([rotation.i as f32, rotation.j as f32, rotation.k as f32, rotation.w as f32])
 }
 
-/// The ellipsoids at 1σ and 3σ about `centre`; none when the covariance is not finite.
+/// The ellipsoids at 1σ and 3σ about `centre`; `None` if the covariance is not finite.
 pub(super) fn ellipsoids(
     centre: &Point3,
     covariance_m2: &Matrix3<f64>,
@@ -140,8 +140,8 @@ pub(super) fn ellipsoids(
     )
 }
 
-/// An image as a PNG of 8 bits; full scale is white and an invalid pixel is black. The values themselves
-/// are in the patches and the surface.
+/// Encodes an image as an 8-bit PNG; full scale is white and invalid pixels are black. The patches and the score map contain
+/// the exact values.
 pub(super) fn png(image: &GrayImage) -> Option<EncodedImage> {
     let levels: Vec<u8> = image.as_raw().iter().map(|v| (v * 255.0).round() as u8).collect();
     let mut bytes = Cursor::new(Vec::new());
@@ -151,7 +151,7 @@ pub(super) fn png(image: &GrayImage) -> Option<EncodedImage> {
     Some(EncodedImage::from_file_contents(bytes.into_inner()).with_media_type("image/png"))
 }
 
-/// Values of `f32` under a colour map with fixed limits; what rerun calls a depth image keeps the values.
+/// An image of `f32` values with a colour map and fixed limits; rerun's depth image preserves the values.
 pub(super) fn mapped(
     [width, height]: [u32; 2],
     values: &[f32],
@@ -175,7 +175,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_centre_of_the_first_pixel_is_half_a_pixel_from_the_corner() {
+    fn the_first_pixel_centre_is_half_a_pixel_from_the_corner() {
         assert_eq!(point(Pixel::new(0.0, 0.0)), [0.5, 0.5]);
         assert_eq!(point(Pixel::new(-0.5, 479.5)), [0.0, 480.0]);
     }

@@ -1,4 +1,4 @@
-//! The hand-off from the mast's cameras to those of the body (R205, R209), in K9's scenarios as they are shipped.
+//! The hand-off from the mast cameras to the body cameras (R205, R209), in K9's scenarios of the library.
 
 use sightline_geometry::camera::CameraModel;
 use sightline_recordings::create_simulated;
@@ -11,8 +11,8 @@ use sightline_world::truth::{Visibility, pixel_truth, visibility};
 use sightline_world::{Eye, World, choose_targets, index, true_camera_in_site};
 
 #[test]
-fn k9_takes_its_last_stop_twice_and_both_pairs_see_the_target() {
-    // R209: three targets, at the start 5, 7.5 and 10 m away.
+fn both_k9_pairs_see_the_target_at_the_last_stop() {
+    // R209: three targets, 5, 7.5 and 10 m away at the start.
     for (name, distance_m) in [("k9-5", 5.0), ("k9-7.5", 7.5), ("k9-10", 10.0)] {
         let scenario = library::scenario(name).unwrap();
         let world = World::new(&scenario);
@@ -45,7 +45,7 @@ fn k9_takes_its_last_stop_twice_and_both_pairs_see_the_target() {
 }
 
 #[test]
-fn a_handed_over_target_is_followed_to_the_last_stop_or_lost_there_without_a_failure() {
+fn a_handed_off_target_never_fails_silently() {
     let mut scenario = library::scenario("k9-5").unwrap();
     (scenario.camera.image_size, scenario.camera.samples_per_axis) = (256, 1);
     scenario.drive.step_fraction = 0.3;
@@ -60,6 +60,6 @@ fn a_handed_over_target_is_followed_to_the_last_stop_or_lost_there_without_a_fai
         [pair.left.dimensions(), pair.right.dimensions()]
     };
     assert_eq!((sizes(0), sizes(steps.len() - 1)), ([(256, 192); 2], [(256, 256); 2]));
-    // What is true does not depend on the tracker: the target is in the last picture.
+    // The truth does not depend on the tracker: the target is in the last image.
     assert!(steps.last().unwrap().truth.as_ref().unwrap().left_pixel.is_some());
 }

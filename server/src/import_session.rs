@@ -1,8 +1,8 @@
-//! Opening what a page brings: a simulated drive by its scenario, and a session from an exported `reproduce.json`.
+//! Opens a simulated drive from a scenario that a page uploads, and a session from an exported `reproduce.json`.
 //!
-//! What is brought was written by anybody, so that everything in it is checked as if it came bit by bit through the other
-//! routes: the scenario's ranges, every run's settings, the numbers of targets and runs, labels, breakpoints and notes. A drive is
-//! remembered in the database, so that its sessions are there again after a restart.
+//! Uploads are untrusted: the scenario's ranges, the settings of every run, the numbers of targets and runs, labels,
+//! breakpoints and notes pass the same checks as in the other routes. Drives are recorded in the database, so that their
+//! sessions survive a restart.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -20,7 +20,7 @@ use sightline_world::Scenario;
 use sightline_world::rover::driven::DrivenStop;
 
 use crate::cancel::CancelFlag;
-use crate::driven;
+use crate::commanded_drive;
 use crate::drives::{folder_name, scenario_of};
 use crate::identity::{Identity, Relation};
 use crate::imports;
@@ -31,11 +31,11 @@ use crate::rendering::OpenTraverse;
 use crate::routes::what_if;
 use crate::state::AppState;
 
-/// Opens the drive of a scenario; says whether it was not open before.
+/// Opens the drive of a scenario; the flag is true if it was not open before.
 ///
 /// # Errors
-/// A problem that names what is wrong with the scenario, when there are too many drives, or soon after `cancel` is set.
-pub(crate) fn open(
+/// A problem that names the fault in the scenario; also when there are too many drives, or soon after `cancel` is set.
+pub(crate) fn open_scenario(
     state: &AppState,
     text: &str,
     cancel: &CancelFlag,
@@ -47,7 +47,7 @@ pub(crate) fn open(
     let text = scenario.to_toml();
     let known = state.traverses();
     let same = |open: &&Arc<OpenTraverse>| {
-        open.driven.is_none() && scenario_of(&open.traverse).is_some_and(|own| own == scenario)
+        open.commanded.is_none() && scenario_of(&open.traverse).is_some_and(|own| own == scenario)
     };
     if let Some(open) = known.iter().find(same) {
         return Ok((Arc::clone(open), false));
@@ -58,11 +58,11 @@ pub(crate) fn open(
         let way_out = "Remove one that is not needed: DELETE traverses/{id}.";
         return Err(ApiError::conflict(detail).hint(limits.drives.hint(way_out)));
     }
-    let _making = state.making_drives();
+    let _lock = state.drive_folder_lock();
     let name = folder_name(&scenario);
     let folder = state.folders().traverses.join(&name);
     if folder.is_dir() && !folder.join(IndexFormat::default().file_name()).is_file() {
-        // What a removal left that was interrupted: images without their index.
+        // An interrupted removal left images without their index.
         remove_folder(&folder)?;
     }
     let traverse = create_simulated_until(&scenario, &folder, cancel.as_ref().into())?;
@@ -77,23 +77,23 @@ pub(crate) fn open(
     Ok((state.add_traverse(open)?, true))
 }
 
-/// Removes a drive that was opened by its scenario, with its folder.
+/// Removes a drive that was opened from a scenario, with its folder.
 ///
 /// # Errors
-/// A problem when it has sessions, or its folder cannot be removed.
-pub(crate) fn remove(state: &AppState, open: &OpenTraverse) -> ApiResult<()> {
-    let _making = state.making_drives();
+/// A problem if the drive has sessions, or its folder cannot be removed.
+pub(crate) fn remove_traverse(state: &AppState, open: &OpenTraverse) -> ApiResult<()> {
+    let _lock = state.drive_folder_lock();
     state.close_traverse(open)?;
-    if open.driven.is_some() {
+    if open.commanded.is_some() {
         remove_folder(open.traverse.folder())?;
     } else if imports::forget(state.folders(), open)? {
-        // Its folder is removed, or only the reference to one that is not the server's.
+        // `forget` removes the folder, or only the reference to a folder outside the data folder.
     } else if let Some(scenario) = scenario_of(&open.traverse) {
         let name = folder_name(&scenario);
         state.store().remove_drive(&name)?;
         remove_folder(&state.folders().traverses.join(&name))?;
     }
-    state.tell(Event::TraverseRemoved { traverse: open.id.clone() });
+    state.send_event(Event::TraverseRemoved { traverse: open.id.clone() });
     Ok(())
 }
 
@@ -106,19 +106,23 @@ pub(crate) fn remove_folder(folder: &Path) -> Result<()> {
     }
 }
 
-/// Begins the session of a file that was exported elsewhere.
+/// Creates a session from a file that was exported elsewhere.
 ///
 /// # Errors
-/// A problem that names what is wrong with it; nothing is begun then.
-pub(crate) fn bring(state: &AppState, new: Reproduction, cancel: &CancelFlag) -> ApiResult<Arc<LiveSession>> {
+/// A problem that names the fault; no session is created then.
+pub(crate) fn import_session(
+    state: &AppState,
+    new: Reproduction,
+    cancel: &CancelFlag,
+) -> ApiResult<Arc<LiveSession>> {
     let Reproduction { traverse, mut session, notes } = new;
     check(&session, state.limits())?;
     let open = match (&traverse.driven, &traverse.scenario_toml) {
-        (Some(stops), Some(text)) => driven(state, text, stops, cancel)?,
+        (Some(stops), Some(text)) => open_commanded_drive(state, text, stops, cancel)?,
         _ => {
-            // Nobody drives where the stops are given.
+            // Without a commanded drive, the stops are fixed and nothing steers.
             session.steering = None;
-            drive(state, &traverse, cancel)?
+            find_or_open(state, &traverse, cancel)?
         }
     };
     let stops = open.traverse.stop_count();
@@ -129,12 +133,12 @@ pub(crate) fn bring(state: &AppState, new: Reproduction, cancel: &CancelFlag) ->
         let notes = Notes::brought(notes, &session)?;
         Ok((session, notes))
     })?;
-    // Asking for it begins its runs.
+    // Loading the session starts its runs.
     state.session(&live.id)
 }
 
-/// The drive on commands of a file, in a world of its own in the state that the file has.
-fn driven(
+/// The commanded drive of a file, in a new world with the recorded state.
+fn open_commanded_drive(
     state: &AppState,
     text: &str,
     stops: &[DrivenStop],
@@ -142,16 +146,16 @@ fn driven(
 ) -> ApiResult<Arc<OpenTraverse>> {
     let wrong = |error: Error| ApiError::invalid("field", error.to_string());
     let scenario = Scenario::from_toml(text, Path::new("scenario")).map_err(wrong)?;
-    let most = state.limits().stops.count();
-    if stops.len() > most {
-        let detail = format!("traverse.driven: may have at most {most} stops");
+    let limit = state.limits().stops.count();
+    if stops.len() > limit {
+        let detail = format!("traverse.driven: may have at most {limit} stops");
         return Err(ApiError::invalid("field", detail).hint(state.limits().stops.raise()));
     }
-    let folder = driven::new_folder(state.folders(), &scenario.name)?;
+    let folder = commanded_drive::new_folder(state.folders(), &scenario.name)?;
     let made = DrivenTraverse::begin_at(&scenario, stops.to_vec(), &folder, cancel.as_ref().into());
     let opened = made.and_then(|world| {
         state.limits().check_drive(world.traverse())?;
-        state.add_traverse(Arc::new(driven::open(world, state.cache(), state.events())?))
+        state.add_traverse(Arc::new(commanded_drive::open(world, state.cache(), state.events())?))
     });
     opened.map_err(|error| {
         let _ = remove_folder(&folder);
@@ -159,8 +163,8 @@ fn driven(
     })
 }
 
-/// The drive of a file: opened by its scenario, or one that is open.
-fn drive(
+/// The traverse of a file: an open one, or one opened from its scenario.
+fn find_or_open(
     state: &AppState,
     traverse: &ReproducedTraverse,
     cancel: &CancelFlag,
@@ -171,7 +175,7 @@ fn drive(
         return Ok(Arc::clone(open));
     }
     match &traverse.scenario_toml {
-        Some(text) => Ok(open(state, text, cancel)?.0),
+        Some(text) => Ok(open_scenario(state, text, cancel)?.0),
         None => {
             let name: String = crate::printable::printable(&traverse.name).chars().take(100).collect();
             if find(Relation::OtherFiles).is_some() {
@@ -188,7 +192,7 @@ fn drive(
     }
 }
 
-/// Refuses what the other routes would refuse.
+/// Applies the checks of the other routes.
 fn check(session: &SavedSession, limits: &Limits) -> ApiResult<()> {
     let wrong = |what: String| Err(ApiError::invalid("field", what));
     let live = session.targets.iter().filter(|target| !target.removed).count();
@@ -206,23 +210,23 @@ fn check(session: &SavedSession, limits: &Limits) -> ApiResult<()> {
         return wrong(format!("session.breakpoints: may be at most {BREAKPOINT_LIMIT}"));
     }
     for (number, target) in session.targets.iter().enumerate() {
-        let place = format!("session.targets[{number}]");
+        let field = format!("session.targets[{number}]");
         if target.label.chars().count() > LABEL_LIMIT {
-            return wrong(format!("{place}.label: may have at most {LABEL_LIMIT} characters"));
+            return wrong(format!("{field}.label: may have at most {LABEL_LIMIT} characters"));
         }
         if target.runs.len() > limits.runs.count() {
-            return too_many(format!("{place}.runs"), &limits.runs);
+            return too_many(format!("{field}.runs"), &limits.runs);
         }
         for (run, saved) in target.runs.iter().enumerate() {
             check_run(saved)
-                .map_err(|error| ApiError::invalid("field", format!("{place}.runs[{run}]: {error}")))?;
+                .map_err(|error| ApiError::invalid("field", format!("{field}.runs[{run}]: {error}")))?;
             what_if::check_pixel(saved.fork.and_then(|fork| fork.prediction_px))?;
         }
     }
     Ok(())
 }
 
-/// Every setting of a run must be one that a person could have chosen.
+/// Accepts only settings that a user could have chosen.
 fn check_run(saved: &SavedRun) -> Result<()> {
     let again = Settings::default().with(&saved.settings.changes())?;
     if again == saved.settings {

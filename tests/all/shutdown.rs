@@ -1,4 +1,4 @@
-//! The end of the program: SIGTERM ends it, whatever it computes.
+//! Termination of the program: SIGTERM ends it during any computation.
 
 use std::io::Write;
 use std::net::TcpStream;
@@ -8,9 +8,9 @@ use std::time::{Duration, Instant};
 use serde_json::json;
 use sightline_tests::server::{TOKEN, small_drive, small_scenario};
 
-use crate::keeping::Killable;
+use crate::persistence::ServerProcess;
 
-/// How long the program may take to end: a fraction of the time that the world takes.
+/// Maximum time for the program to end: a fraction of the time that building the world takes.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// Processor time of a process, hundredths of a second.
@@ -20,7 +20,7 @@ fn ticks(id: u32) -> u64 {
     fields[11].parse::<u64>().unwrap() + fields[12].parse::<u64>().unwrap()
 }
 
-/// A scenario with as many rocks as there may be under the wheels at the first stop: a world of many seconds.
+/// A scenario with the maximum number of rocks under the wheels at the first stop: its world takes many seconds to build.
 pub(crate) fn crowded() -> String {
     let mut scenario = small_scenario();
     scenario.rocks.placed.clear();
@@ -35,7 +35,7 @@ pub(crate) fn crowded() -> String {
 #[cfg(target_os = "linux")]
 fn sigterm_ends_a_server_that_builds_a_world() {
     let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
-    let mut server = Killable::start_at("0", drive.path(), data.path());
+    let mut server = ServerProcess::start_at("0", drive.path(), data.path());
     let id = server.process().id();
     let before = ticks(id);
     let body = json!({ "scenario": crowded() }).to_string();
@@ -48,19 +48,19 @@ fn sigterm_ends_a_server_that_builds_a_world() {
     )
     .unwrap();
     let begun = Instant::now();
-    // Reading the scenario takes less.
+    // Reading the scenario takes less time.
     while ticks(id) < before + 300 {
         assert!(begun.elapsed() < Duration::from_secs(120), "the world is not begun");
         std::thread::sleep(Duration::from_millis(20));
     }
     assert!(server.process().try_wait().unwrap().is_none());
     assert!(Command::new("kill").args(["-TERM", &id.to_string()]).status().unwrap().success());
-    let told = Instant::now();
+    let signalled = Instant::now();
     let status = loop {
         if let Some(status) = server.process().try_wait().unwrap() {
             break status;
         }
-        assert!(told.elapsed() < PATIENCE, "the program does not end");
+        assert!(signalled.elapsed() < PATIENCE, "the program does not end");
         std::thread::sleep(Duration::from_millis(20));
     };
     assert!(status.success(), "{status}");

@@ -1,4 +1,4 @@
-//! Actions that were copied as `curl` or as a command are run in a shell, and do what they say.
+//! Actions copied as `curl` commands or as commands of the program are run in a shell and have the same effect.
 
 use std::process::Command;
 
@@ -10,7 +10,7 @@ use sightline_tests::server::{PIXEL, TOKEN, TestServer, access, rows_of_run, sma
 use crate::cli::program;
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_is_copied_as_curl_does_what_it_says() {
+async fn copied_curl_commands_have_the_described_effect() {
     use sightline_session::shell::Curl;
     let (drive, folder) = (small_drive(), tempfile::tempdir().unwrap());
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
@@ -33,33 +33,34 @@ async fn what_is_copied_as_curl_does_what_it_says() {
             Command::new("sh").args(["-c", &text]).env("SIGHTLINE_TOKEN", TOKEN).output().unwrap()
         })
     };
-    let said = |output: std::process::Output| {
+    let json_of = |output: std::process::Output| {
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         serde_json::from_slice::<Value>(&output.stdout).unwrap_or(Value::Null)
     };
-    let begun = said(shell("POST", "sessions", Some(json!({ "traverse": id })), None, None).await.unwrap());
-    assert_eq!(begun["id"], json!("s1"));
+    let session =
+        json_of(shell("POST", "sessions", Some(json!({ "traverse": id })), None, None).await.unwrap());
+    assert_eq!(session["id"], json!("s1"));
     let [x, y] = PIXEL;
     let target = json!({ "step": 0, "pixel": { "x": x, "y": y }, "label": "it's $HOME `x` \"@\"" });
-    let made = said(shell("POST", "sessions/s1/targets", Some(target.clone()), None, None).await.unwrap());
+    let made = json_of(shell("POST", "sessions/s1/targets", Some(target.clone()), None, None).await.unwrap());
     assert_eq!(made["session"]["targets"][0]["label"], target["label"]);
     let cursor = json!({ "target": 0, "run": 0, "step": 1 });
     assert_eq!(
-        said(shell("PUT", "sessions/s1/cursor", Some(cursor.clone()), None, None).await.unwrap()),
+        json_of(shell("PUT", "sessions/s1/cursor", Some(cursor.clone()), None, None).await.unwrap()),
         cursor
     );
     let note = json!({ "step": 1, "text": "@file 'quoted'" });
     assert_eq!(
-        said(shell("POST", "sessions/s1/notes", Some(note.clone()), None, None).await.unwrap())["text"],
+        json_of(shell("POST", "sessions/s1/notes", Some(note.clone()), None, None).await.unwrap())["text"],
         note["text"]
     );
     let edit = json!({ "text": "changed" });
     let edited = shell("PATCH", "sessions/s1/notes/1", Some(edit.clone()), Some(1), None).await.unwrap();
-    assert_eq!(said(edited)["revision"], json!(2));
+    assert_eq!(json_of(edited)["revision"], json!(2));
     let late = shell("PATCH", "sessions/s1/notes/1", Some(edit), Some(1), None).await.unwrap();
     assert!(!late.status.success(), "a problem makes the command fail");
     let file = folder.path().join("it's rows.csv").to_str().unwrap().to_owned();
-    said(
+    json_of(
         shell("GET", "sessions/s1/exports/rows.csv?target=0", None, None, Some(file.clone())).await.unwrap(),
     );
     assert!(std::fs::read_to_string(file).unwrap().starts_with("target,label,run,step,state,"));
