@@ -330,7 +330,7 @@ fn a_step_is_reached_by_number_difference_time_and_event() {
     assert!(go("fault").unwrap_err().contains("No stop of this run"));
     assert!(go("tracking").unwrap_err().contains("is never in the state tracking"));
     assert!(go("soon").unwrap_err().contains("t=3.5"));
-    assert!(go("t=now").unwrap_err().contains("no time in seconds"));
+    assert!(go("t=now").unwrap_err().contains("not a time in seconds"));
 }
 
 #[test]
@@ -348,7 +348,7 @@ fn the_go_to_box_shows_what_is_meant_and_keeps_what_cannot_be() {
     };
     go_to("lost").says("step 3");
     let mut bad = go_to("nowhere");
-    bad.says("is no step");
+    bad.says("is not a step");
     bad.harness.key_press(egui::Key::Enter);
     bad.harness.run_steps(2);
     assert!(!bad.harness.state().contains(&Command::SetMode(crate::command::Mode::Look)));

@@ -89,7 +89,7 @@ fn the_budget_of_the_test_beds_navcam_is_that_of_the_paper() {
         state
     });
     shown.says("38.75 cm").says("41.92 cm").says("2.19 cm").says("below the 3 cm").says("2.50 px");
-    shown.says("of 5 errors lie within").says("errata").says("18.7");
+    shown.says("of 5 errors are within").says("errata").says("18.7");
 }
 
 #[test]

@@ -255,7 +255,7 @@ fn a_file_says_in_its_name_and_above_it_of_what_it_is() {
     let request = |kind| FigureRequest { pane: Pane::Map, kind };
     let svg = save::take(&context, &state, &[], request(FigureFormat::Svg)).unwrap();
     assert_eq!(svg.name, "sightline-s1-ridge-run-a-step-2-map-site-frame.svg");
-    assert!(svg.sentence.contains("not on the screen: it was drawn apart"), "{}", svg.sentence);
+    assert!(svg.sentence.contains("not on the screen: it was drawn separately"), "{}", svg.sentence);
     let text = String::from_utf8(svg.bytes).unwrap();
     let document = roxmltree::Document::parse(&text).unwrap();
     let word =

@@ -8,7 +8,7 @@ fn the_top_bar_chooses_the_run_to_compare_with_and_takes_it_out() {
     shown.click("compared with: none");
     assert_eq!(shown.click("run B"), vec![Command::Compare(CompareCommand::With { place: 0, run: Some(B) })]);
     let mut shown = Shown::new([1500.0, 300.0], |context| compared(context, 3), bars::top);
-    shown.says("run looked at: run A").says("compared with: run B").says("third run compared: +");
+    shown.says("selected run: run A").says("compared with: run B").says("third run compared: +");
     assert_eq!(
         shown.click("take compared with out"),
         vec![Command::Compare(CompareCommand::With { place: 0, run: None })]
