@@ -13,7 +13,7 @@
 //! | symbol | name | unit |
 //! |---|---|---|
 //! | s | distance along the path | m |
-//! | q | quality of the cell, `ground.rs` | – |
+//! | q | lowest quality of the discs at s (`ground.rs`) | – |
 //! | ω | `worst_weight`: ½ for GESTALT, 0 for Morphin | – |
 //!
 //! A rover on bad cells may leave them: within `escape_m` a disc that was bad at the start may remain so as long as it
@@ -275,13 +275,14 @@ impl<'a> Path<'a> {
     /// The hazard term, 0 (worst) to 1.
     pub(super) fn hazard(&self) -> f64 {
         let (mut worst, mut sum, mut weights) = (f64::INFINITY, 0.0, 0.0);
-        for sample in self.samples.iter().filter(|sample| sample.disc.number == 0 || self.is_turn) {
-            let weight = 1.0 / (1.0 + sample.disc.along_m);
+        for discs in self.samples.chunk_by(|before, after| before.disc.number < after.disc.number) {
+            let weight = 1.0 / (1.0 + discs[0].disc.along_m);
             weights += weight;
-            if sample.spot.cell.basis != CellBasis::Unknown {
-                let quality = sample.spot.quality(self.settings);
+            let known = discs.iter().filter(|sample| sample.spot.cell.basis != CellBasis::Unknown);
+            let qualities = known.map(|sample| (sample.spot.quality(self.settings), &sample.spot));
+            if let Some((quality, spot)) = qualities.min_by(|a, b| a.0.total_cmp(&b.0)) {
                 worst = worst.min(quality);
-                sum += weight * quality * self.certainty(&sample.spot);
+                sum += weight * quality * self.certainty(spot);
             }
         }
         if !worst.is_finite() {
