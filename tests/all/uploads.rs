@@ -107,7 +107,11 @@ async fn a_folder_is_sent_file_by_file_examined_and_imported() {
     assert_eq!((&view["format"], &view["stop_count"]), (&json!("KITTI odometry"), &json!(3)));
     assert_eq!(view["pairs"][0]["right"], json!("image_1/000000.png"));
     let traverse = import(&server, &upload).await;
-    assert_eq!((&traverse["name"], file_count(&folder)), (&json!("drive"), 0), "what was sent is imported");
+    assert_eq!(
+        (&traverse["name"], file_count(&folder)),
+        (&json!("drive"), 0),
+        "the upload is imported and removed"
+    );
     server
         .json(Method::DELETE, &format!("uploads/{}", upload["id"].as_str().unwrap()), &json!({}))
         .await

@@ -82,7 +82,7 @@ pub struct CellSummary {
     pub arrived: usize,
     /// 95 % interval of the fraction of arrived drives.
     pub arrived_interval: [f64; 2],
-    /// Number of drives with a path to the goal, and of those that arrived.
+    /// Number of drives with a path to the goal, and number of these drives that arrived.
     pub with_way: [usize; 2],
     /// Collisions in all drives.
     pub collisions: u32,

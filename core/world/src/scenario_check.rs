@@ -20,7 +20,7 @@ impl Scenario {
     }
 
     /// Rejects settings from which no world can be built, naming the first bad one. The ranges keep sizes finite and
-    /// geometry possible; they do not limit a scenario to what is plausible on Mars.
+    /// geometry possible; they permit scenarios that are implausible on Mars.
     pub fn validate(&self) -> Result<()> {
         self.validate_name()?;
         if self.seed > MAX_SEED {

@@ -57,7 +57,7 @@ fn drill_many_sessions_step_at_the_same_time() {
     let (drive, data) = (small_drive(), tempfile::tempdir().unwrap());
     let server = ServerProcess::start(drive.path(), data.path());
     let traverse = traverse(&server);
-    // First create what is created once and stored: images, threads of the tracker.
+    // First create everything that is created only once: images, threads of the tracker.
     step_through(&server, &traverse, scale(4, 1), Duration::from_secs(scale(2, 0)));
     let mut watched = Watched::of(&server, Duration::from_secs(scale(15, 12)), || {
         step_through(&server, &traverse, count, lasting)
@@ -139,7 +139,7 @@ fn drill_exports_give_everything_back() {
         let file = files[number % files.len()];
         server.bytes(&format!("sessions/{session}/exports/{file}")).len()
     };
-    // First create what is created once and stored: fonts, the sources of the page, caches.
+    // First create everything that is created only once: fonts, the sources of the page, caches.
     (0..files.len()).for_each(|number| assert!(export(number) > 0));
     let watched =
         Watched::of(&server, Duration::from_secs(scale(15, 1)), || (0..count).map(export).sum::<usize>());

@@ -16,7 +16,7 @@ const LEFT_OUT: &str = "SIGHTLINE_LEFT_OUT";
 
 /// Returns the file or folder `name` of the data sets, or `None` if it is missing.
 ///
-/// `None` records the calling test as skipped; `purpose` states in the test's output what was not compared.
+/// `None` records the calling test as skipped; `purpose` names the comparison that was left out, for the test's output.
 pub fn recorded(name: &str, purpose: &str) -> Option<PathBuf> {
     let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     let path = std::env::var_os(FOLDER).map_or_else(beside, PathBuf::from).join(name);

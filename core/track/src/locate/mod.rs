@@ -57,7 +57,7 @@ pub struct Located {
     /// Confidence, 0 to 1: for `template` the score of the match, at least 0; for `features` D-Eq 7; if located by
     /// shape, the share of the target's pixels that both surfaces cover.
     pub confidence: f64,
-    /// What is missing and why, as one sentence; null if nothing is.
+    /// The missing result and the reason, in one sentence; null if the target was located.
     pub missing: Option<String>,
     /// The tracker's measurements at this stop.
     pub evidence: Evidence,

@@ -22,7 +22,7 @@ const MAX_OFFSET_STD: f32 = 6.0;
 /// `toom_cook` err by at most 1.2e-6 of it, most by 1e-7.
 const MAX_TILE_STD: f32 = 24.0;
 
-/// Placeholder of a score that `exact` must compute.
+/// Value outside the range of scores: marks one that is too uncertain and that `exact` must compute.
 pub(in crate::correlate) const DOUBTFUL: f32 = 2.0;
 
 /// Constants that convert the sums of a group of rows into scores.
