@@ -30,7 +30,7 @@ settings_group! {
         /// Largest step with full goodness.
         step_ok_m: f64 = 0.08, "m", Domain::Between(0.0, 1.0), "ours, after Goldberg02";
         /// Step from which on the goodness is 0.
-        step_bad_m: f64 = 0.20, "m", Domain::Between(0.001, 2.0), "ours, after Goldberg02";
+        step_bad_m: f64 = 0.18, "m", Domain::Between(0.001, 2.0), "ours: wheels climb 0.25 m; docs/driving.md";
         /// If the heights of a cell's points spread by more, they are on the face of an obstacle, whose height is that of
         /// its upper edge.
         face_spread_m: f64 = 0.03, "m", Domain::Between(0.0, 2.0), "ours; docs/driving.md";

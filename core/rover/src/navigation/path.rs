@@ -32,7 +32,7 @@ use super::settings::NavigatorSettings;
 /// Sampling interval of a turn, rad.
 const TURN_SAMPLE_RAD: f64 = 10.0 * std::f64::consts::PI / 180.0;
 
-/// Smallest curvature of a tight arc, 1/m: the rear corners then swing out by 8 cm and more, the margin of the discs.
+/// Smallest curvature of a tight arc, 1/m: the rear corners then swing out by 8 cm and more.
 const TIGHT_PER_M: f64 = 0.35;
 
 /// Horizontal position and heading of the rover.
