@@ -147,7 +147,7 @@ fn the_rover_stays_without_range_data_or_a_safe_path() {
     });
     assert_eq!(blocked.reason, StopReason::NoSafePath);
     let sentence = blocked.detail.unwrap();
-    assert!(sentence.contains("a step limit of 0.250 m instead of 0.182 m opens"), "{sentence}");
+    assert!(sentence.contains("a step limit of 0.250 m instead of 0.165 m opens"), "{sentence}");
 }
 
 #[test]
