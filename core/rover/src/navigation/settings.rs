@@ -30,7 +30,7 @@ settings_group! {
         /// Sampling interval along a path.
         sample_m: f64 = 0.05, "m", Domain::Between(0.01, 0.5), "ours: half a cell";
         /// Distance of the leading disc of the footprint from the rover's origin: the disc covers the front wheels with a
-        /// margin of 13 cm, so that it contains the top of a rock whose foot they would touch.
+        /// margin of 13 cm, because the top of a rock is that far behind its foot, where a wheel stalls.
         reach_m: f64 = 0.55, "m", Domain::Between(0.0, 2.0), "ours";
         /// Increment of the turns in place that are tried if no arc passes.
         turn_deg: f64 = 20.0, "deg", Domain::Between(1.0, 180.0), "ours, after Goldberg02";
