@@ -21,6 +21,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::deck;
 use super::disc_sums::{DiscSums, disc_sums};
 use super::grid::{Disc, Grid};
 use super::map::HazardMap;
@@ -245,10 +246,11 @@ impl GoodnessCell {
 
 /// Assesses every cell of a hazard map.
 pub fn assess(map: &HazardMap, rules: &MapRules, settings: &HazardSettings) -> GoodnessMap {
-    let [disc, reach] = [settings.rover_radius_m, settings.step_reach_m]
+    let [disc, reach, overhang] = [settings.rover_radius_m, settings.step_reach_m, settings.deck_overhang_m]
         .map(|radius_m| Disc::new(radius_m / map.grid.cell_m));
     let (sums, steps) =
         rayon::join(|| disc_sums(map, &disc, settings.weight_min), || steps(map, &disc, &reach, settings));
+    let steps = deck::widen(&steps, map.grid.side, &overhang, settings.deck_clearance_m as f32);
     let cells = sums
         .par_iter()
         .zip(&steps)

@@ -27,6 +27,7 @@ pub mod map;
 mod disc_sums;
 mod slope;
 mod steps;
+mod deck;
 pub mod goodness;
 pub mod points;
 #[cfg(test)]

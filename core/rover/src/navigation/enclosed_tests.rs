@@ -40,7 +40,7 @@ fn a_goal_behind_a_corner_that_the_rover_cannot_turn_in_is_enclosed() {
     let is_wall = |x: f64, y: f64| x.abs() < 3.0 && y.abs() < 3.0 && !is_free(x, y);
     let goal = [5.0, 1.0];
     let stance = pose([0.0, 0.0], 0.0);
-    let height = |x: f64, y: f64| if is_wall(x - goal[0], y - goal[1]) { -0.8 } else { 0.0 };
+    let height = |x: f64, y: f64| if is_wall(x - goal[0], y - goal[1]) { -0.4 } else { 0.0 };
     let map = known_to(8.0, &stance, &HazardSettings::default(), height);
     let choice = select(NavigatorPreset::Gestalt, &map, &stance, goal, 0.6);
     let blocked = choice.blocked_goal.unwrap();

@@ -330,7 +330,7 @@ fn check_changes(settings: &HazardSettings, height: fn(f64, f64) -> f64, expecte
 #[test]
 fn a_raised_limit_opens_exactly_the_paths_it_names() {
     // A bowl that is steeper on one side; steps do not matter there.
-    let settings = HazardSettings { step_bad_m: 0.6, ..HazardSettings::default() };
+    let settings = HazardSettings { step_bad_m: 0.6, deck_clearance_m: 10.0, ..HazardSettings::default() };
     let bowl = |x: f64, y: f64| -0.3 * ((x * x + 1.3 * y * y).sqrt() - 0.1 * y).max(0.4).powi(2);
     check_changes(&settings, bowl, HazardTerm::Tilt);
     // A surrounding wall that grows with the bearing.

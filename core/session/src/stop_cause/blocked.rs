@@ -17,6 +17,10 @@ const RISEN_CELLS: usize = 10;
 /// Cells must rise at `RISEN_STOPS` of the last `LAST_STOPS` stops; they do not rise at stops where the rover turns.
 const LAST_STOPS: usize = 20;
 const RISEN_STOPS: usize = 3;
+/// Two stops suffice if the mean of their risen cells, relative to the rover, differs by at most `SAME_PLACE_M` although
+/// the rover has moved by `MOVED_M` or more.
+const SAME_PLACE_M: f64 = 0.15;
+const MOVED_M: f64 = 0.3;
 
 impl StoppedDrive<'_> {
     /// The path choice at the last stop.
@@ -44,7 +48,7 @@ impl StoppedDrive<'_> {
             .collect();
         let last = self.steps.last()?.step;
         let lately = risen.iter().filter(|(step, _)| step + LAST_STOPS > last).count();
-        if lately < RISEN_STOPS {
+        if lately < RISEN_STOPS && !self.moves_with_the_rover(&risen) {
             return None;
         }
         let (from, _) = risen.first()?;
@@ -55,12 +59,13 @@ impl StoppedDrive<'_> {
         ahead_m.sort_by(f64::total_cmp);
         let counts = risen.iter().map(|(_, cells)| cells.len());
         let (fewest, most) = (counts.clone().min()?, counts.max()?);
+        let counts = if fewest == most { fewest.to_string() } else { format!("{fewest} to {most}") };
         let sentence = format!(
             "The obstacle is false: since stop {from} it is ahead of the rover wherever that stands, on ground that was measured lower at \
              the stop before."
         );
         let where_is = format!(
-            "At {} of the stops since then, {fewest} to {most} cells are more than {:.0} cm higher than at the stop before; at stop {at} \
+            "At {} of the stops since then, {counts} cells are more than {:.0} cm higher than at the stop before; at stop {at} \
              they are about {} ahead.",
             risen.len(),
             100.0 * RISEN_M,
@@ -70,6 +75,23 @@ impl StoppedDrive<'_> {
                     hazard pair."
             .to_owned();
         Some(Found { cause: StopCause::FalseObstacle, sentence, evidence: vec![where_is, what] })
+    }
+
+    /// Whether the risen cells of the last two stops with such cells are at the same place relative to the rover, although
+    /// it has moved.
+    fn moves_with_the_rover(&self, risen: &[(usize, Vec<[f64; 2]>)]) -> bool {
+        let [.., before, last] = risen else { return false };
+        let from_rover = |(step, cells): &(usize, Vec<[f64; 2]>)| {
+            let sum = cells.iter().fold([0.0; 2], |sum, cell| [sum[0] + cell[0], sum[1] + cell[1]]);
+            let [x, y] = sum.map(|sum| sum / cells.len() as f64);
+            let site_from_rover = self.stops.site_from_rover(*step);
+            let origin = site_from_rover.translation.vector;
+            let seen = site_from_rover.inverse() * Point3::new(x, y, origin.z);
+            ([seen.x, seen.y], [origin.x, origin.y])
+        };
+        let distance_m = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+        let ((seen_before, was_at), (seen, is_at)) = (from_rover(before), from_rover(last));
+        distance_m(seen_before, seen) <= SAME_PLACE_M && distance_m(was_at, is_at) >= MOVED_M
     }
 
     /// Ground beyond a limit on every path, or on every arc ahead of a rover that turns to and fro.
