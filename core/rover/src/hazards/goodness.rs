@@ -21,7 +21,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::deck;
+use super::deck::deck_steps;
 use super::disc_sums::{DiscSums, disc_sums};
 use super::grid::{Disc, Grid};
 use super::map::HazardMap;
@@ -66,6 +66,9 @@ pub struct GoodnessCell {
     pub roughness_m: f32,
     /// Largest step in the disc, m.
     pub step_m: f32,
+    /// Largest step that reaches the deck of a rover whose origin is here, m; 0 without one.
+    #[serde(default)]
+    pub deck_step_m: f32,
     /// 0 (no data) to 1.
     pub certainty: f32,
     /// Mean distance driven since the observations, m.
@@ -200,7 +203,7 @@ impl GoodnessCell {
 
     fn new(
         sums: &DiscSums,
-        (step_m, heights_m): (f32, Option<[f32; 2]>),
+        ([step_m, deck_step_m], heights_m): ([f32; 2], Option<[f32; 2]>),
         disc: &Disc,
         driven_m: f64,
         settings: &HazardSettings,
@@ -215,7 +218,8 @@ impl GoodnessCell {
         let age_m = driven_m - sums.moments.odometer_m() / count;
         let [height_m, top_m] = [0, 1].map(|k| heights_m.map(|heights_m| heights_m[k]));
         let (certainty_f32, age_m) = (certainty as f32, age_m as f32);
-        let cell = Self { step_m, certainty: certainty_f32, age_m, height_m, top_m, ..Self::default() };
+        let steps = Self { step_m, deck_step_m, ..Self::default() };
+        let cell = Self { certainty: certainty_f32, age_m, height_m, top_m, ..steps };
         let Some(plane) = sums.moments.plane() else { return cell };
         let mut cell = Self {
             tilt_deg: plane.tilt_rad.to_degrees() as f32,
@@ -250,12 +254,12 @@ pub fn assess(map: &HazardMap, rules: &MapRules, settings: &HazardSettings) -> G
         .map(|radius_m| Disc::new(radius_m / map.grid.cell_m));
     let (sums, steps) =
         rayon::join(|| disc_sums(map, &disc, settings.weight_min), || steps(map, &disc, &reach, settings));
-    let steps = deck::widen(&steps, map.grid.side, &overhang, settings.deck_clearance_m as f32);
+    let deck_steps = deck_steps(&steps, map.grid.side, &overhang, settings.deck_clearance_m as f32);
     let cells = sums
         .par_iter()
-        .zip(&steps)
+        .zip(steps.par_iter().zip(&deck_steps))
         .enumerate()
-        .map(|(index, (sums, step_m))| {
+        .map(|(index, (sums, (step_m, deck_step_m)))| {
             let (row, column) = (index / map.grid.side, index % map.grid.side);
             let own = map.cell(row, column);
             let heights_m = (own.count() >= settings.weight_min).then(|| {
@@ -263,7 +267,8 @@ pub fn assess(map: &HazardMap, rules: &MapRules, settings: &HazardSettings) -> G
                 let top_m = map.upper_edge_m(row, column, settings.face_spread_m).unwrap_or(mean_m);
                 [mean_m, top_m].map(|relative_m| (map.height_m + relative_m) as f32)
             });
-            let cell = GoodnessCell::new(sums, (*step_m, heights_m), &disc, map.driven_m, settings);
+            let cell =
+                GoodnessCell::new(sums, ([*step_m, *deck_step_m], heights_m), &disc, map.driven_m, settings);
             cell.with_rules(map.grid.centre_m(index), rules)
         })
         .collect();

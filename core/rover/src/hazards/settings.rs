@@ -33,7 +33,8 @@ settings_group! {
         step_bad_m: f64 = 0.18, "m", Domain::Between(0.001, 2.0), "ours: wheels climb 0.25 m; docs/driving.md";
         /// A step higher than this reaches the deck: 0.62 m above the ground, with a margin.
         deck_clearance_m: f64 = 0.5, "m", Domain::Between(0.0, 10.0), "ours, after the deck of MER";
-        /// Distance beyond the disc in which such a step counts: half the width of the deck (1.15 m) with a margin.
+        /// Distance beyond the disc at the rover's origin in which such a step counts: half the width of the deck (1.15 m)
+        /// with a margin.
         deck_overhang_m: f64 = 0.45, "m", Domain::Between(0.0, 3.0), "ours, after the deck of MER";
         /// If the heights of a cell's points spread by more, they are on the face of an obstacle, whose height is that of
         /// its upper edge.

@@ -120,16 +120,17 @@ fn level_ground_before_a_wall_has_no_steps() {
         let seen: Vec<Point3> = seen.into_iter().filter(|point| point.x < 1.0 + top_m).collect();
         let map = mapped(None, &seen, &pose(0.0, 0.0), 0.0, &settings);
         let map = assess(&map, &MapRules::default(), &settings);
-        // A wall that reaches the deck is a step from 1.25 m on, others from 0.8 m on.
-        let level: &[f64] = if height_m > 0.5 { &[-2.0, -1.0, -0.4] } else { &[-2.0, -1.0, -0.5, 0.0, 0.1] };
-        for &x in level {
+        for x in [-2.0, -1.0, -0.5, 0.0, 0.1] {
             let cell = map.cell_at([x, 0.3]).unwrap();
             assert!(cell.step_m < 1e-6, "wall of {height_m} m, top of {top_m} m, {x}: {cell:?}");
         }
-        for x in if height_m > 0.5 { [0.5, -0.1] } else { [0.5, 0.3] } {
-            let at_wall = map.cell_at([x, 0.3]).unwrap().step_m;
-            assert!((f64::from(at_wall) - height_m).abs() < 1e-6, "{height_m}, {x}: {at_wall}");
+        // A wall that reaches the deck counts from 1.25 m on.
+        for (x, is_high) in [(-0.4, false), (-0.1, height_m > 0.5)] {
+            let found = f64::from(map.cell_at([x, 0.3]).unwrap().deck_step_m);
+            assert!((found - if is_high { height_m } else { 0.0 }).abs() < 1e-6, "{height_m}, {x}: {found}");
         }
+        let at_wall = map.cell_at([0.5, 0.3]).unwrap().step_m;
+        assert!((f64::from(at_wall) - height_m).abs() < 1e-6, "{height_m}: {at_wall}");
     }
 }
 

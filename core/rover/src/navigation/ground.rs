@@ -5,6 +5,8 @@
 //!             − distance of the nearest other cell    on bad cells
 //! quality   = goodness · (½ + ½ min(1, clearance/clearance_m))
 //! ```
+//! A cell is bad for the disc at the rover's origin also if a step nearby reaches the deck.
+//!
 //! Distances are those of paths over neighbouring cells (1 and √2), at most 8 % too long [Borgefors86].
 //!
 //! Frame: site, m.
@@ -19,6 +21,7 @@ const OUTSIDE: GoodnessCell = GoodnessCell {
     tilt_deg: 0.0,
     roughness_m: 0.0,
     step_m: 0.0,
+    deck_step_m: 0.0,
     certainty: 0.0,
     age_m: 0.0,
     height_m: None,
@@ -30,12 +33,36 @@ const OUTSIDE: GoodnessCell = GoodnessCell {
 /// Clearance if the window has no bad cell, m.
 const FAR_M: f32 = 1e6;
 
+/// The discs of the footprint.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Part {
+    /// The disc at the rover's origin, with the deck.
+    Origin,
+    /// The discs ahead of it and behind it.
+    End,
+}
+
+impl Part {
+    /// The part of a disc by its number, 0 at the rover's origin.
+    pub(super) const fn of(number: usize) -> Self {
+        if number == 0 { Self::Origin } else { Self::End }
+    }
+
+    /// The cell as this disc meets it.
+    fn met(self, cell: &GoodnessCell) -> GoodnessCell {
+        match self {
+            Self::Origin => GoodnessCell { step_m: cell.step_m.max(cell.deck_step_m), ..*cell },
+            Self::End => *cell,
+        }
+    }
+}
+
 /// A goodness map with the limits of the navigator.
 pub(super) struct Ground<'a> {
     pub(super) map: &'a GoodnessMap,
     pub(super) limits: VetoLimits,
-    /// Clearance of the cells, row by row, m; negative on bad cells.
-    clearance_m: Vec<f32>,
+    /// Clearance of the cells for each [`Part`], row by row, m; negative on bad cells.
+    clearance_m: [Vec<f32>; 2],
 }
 
 /// The ground at a position.
@@ -51,38 +78,43 @@ pub(super) struct Spot {
 impl<'a> Ground<'a> {
     pub(super) fn new(map: &'a GoodnessMap, limits: VetoLimits) -> Self {
         let side = map.grid.side;
-        let bad: Vec<bool> = map.cells.iter().map(|cell| limits.exceeded(cell).is_some()).collect();
         let cell_m = map.grid.cell_m as f32;
-        let [from_bad, from_other] = [true, false].map(|wanted| distances(&bad, wanted, side));
-        let clearance_m = bad.iter().zip(from_bad.iter().zip(&from_other)).map(|(is_bad, (bad, other))| {
-            let cells = if *is_bad { -other } else { *bad };
-            (cells * cell_m).clamp(-FAR_M, FAR_M)
+        let clearance_m = [Part::Origin, Part::End].map(|part| {
+            let is_bad = |cell: &GoodnessCell| limits.exceeded(&part.met(cell)).is_some();
+            let bad: Vec<bool> = map.cells.iter().map(is_bad).collect();
+            let [from_bad, from_other] = [true, false].map(|wanted| distances(&bad, wanted, side));
+            let all = bad.iter().zip(from_bad.iter().zip(&from_other));
+            let clearance_m = all.map(|(is_bad, (bad, other))| {
+                let cells = if *is_bad { -other } else { *bad };
+                (cells * cell_m).clamp(-FAR_M, FAR_M)
+            });
+            clearance_m.collect()
         });
-        Self { map, limits, clearance_m: clearance_m.collect() }
+        Self { map, limits, clearance_m }
     }
 
-    /// The ground at a position, site frame, m.
-    pub(super) fn spot(&self, at_m: [f64; 2]) -> Spot {
+    /// The ground under a disc at a position, site frame, m.
+    pub(super) fn spot(&self, at_m: [f64; 2], part: Part) -> Spot {
         let Some(index) = self.map.grid.index_at(at_m) else {
             return Spot { index: None, cell: OUTSIDE, clearance_m: f64::from(FAR_M) };
         };
-        self.spot_of(index)
+        self.spot_of(index, part)
     }
 
-    /// Whether a term of a cell exceeds its limit.
-    pub(super) fn is_bad(&self, index: usize) -> bool {
-        self.clearance_m[index] < 0.0
+    /// Whether a term of a cell exceeds its limit for a disc.
+    pub(super) fn is_bad(&self, index: usize, part: Part) -> bool {
+        self.clearance_m[part as usize][index] < 0.0
     }
 
-    /// Whether the ground at a position, site frame, m, is bad; false outside the window.
-    pub(super) fn is_bad_at(&self, at_m: [f64; 2]) -> bool {
-        self.map.grid.index_at(at_m).is_some_and(|index| self.is_bad(index))
+    /// Whether the ground under a disc at a position, site frame, m, is bad; false outside the window.
+    pub(super) fn is_bad_at(&self, at_m: [f64; 2], part: Part) -> bool {
+        self.map.grid.index_at(at_m).is_some_and(|index| self.is_bad(index, part))
     }
 
-    /// The ground of a cell.
-    pub(super) fn spot_of(&self, index: usize) -> Spot {
-        let clearance_m = f64::from(self.clearance_m[index]);
-        Spot { index: Some(index), cell: self.map.cells[index], clearance_m }
+    /// The ground of a cell under a disc.
+    pub(super) fn spot_of(&self, index: usize, part: Part) -> Spot {
+        let clearance_m = f64::from(self.clearance_m[part as usize][index]);
+        Spot { index: Some(index), cell: part.met(&self.map.cells[index]), clearance_m }
     }
 }
 

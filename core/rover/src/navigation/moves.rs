@@ -13,7 +13,7 @@
 use crate::driving::motion::Motion;
 use crate::driving::select_path::ArcNavigator;
 
-use super::ground::Ground;
+use super::ground::{Ground, Part};
 use super::path::{Footprint, Path, Stance, is_unknown_behind};
 use super::route::Route;
 use super::settings::NavigatorSettings;
@@ -95,8 +95,9 @@ impl<'a> Moves<'a> {
     pub(super) fn start(&self, stance: Stance) -> Start {
         let (sine, cosine) = stance.heading_rad.sin_cos();
         let start = Start { stance, sine, cosine, is_free: true };
-        let discs = [0.0, self.settings.reach_m, -self.settings.reach_m];
-        let is_free = !discs.iter().any(|ahead| self.ground.is_bad_at(start.place([*ahead, 0.0])));
+        let ends_m = [self.settings.reach_m, -self.settings.reach_m];
+        let is_free = !self.ground.is_bad_at(stance.at_m, Part::Origin)
+            && !ends_m.iter().any(|ahead| self.ground.is_bad_at(start.place([*ahead, 0.0]), Part::End));
         Start { is_free, ..start }
     }
 
@@ -128,7 +129,7 @@ impl<'a> Moves<'a> {
         for disc in &footprint.discs {
             let index = self.ground.map.grid.index_at(start.place(disc.place_m));
             let is_safe = match index {
-                Some(index) if self.ground.is_bad(index) => false,
+                Some(index) if self.ground.is_bad(index, Part::of(disc.number)) => false,
                 Some(index) => {
                     !is_backwards || !is_unknown_behind(&self.ground.map.cells[index], self.settings)
                 }
@@ -156,7 +157,8 @@ impl<'a> Moves<'a> {
 
     /// Whether neither the disc at the rover's origin nor the leading one is on bad ground.
     pub(super) fn can_stand(&self, stance: &Stance) -> bool {
-        [0.0, self.settings.reach_m].iter().all(|ahead| !self.ground.is_bad_at(stance.place([*ahead, 0.0])))
+        !self.ground.is_bad_at(stance.at_m, Part::Origin)
+            && !self.ground.is_bad_at(stance.place([self.settings.reach_m, 0.0]), Part::End)
     }
 
     /// The last motions to a goal in reverse order, if it is near and they are safe: one arc, or a turn and a straight

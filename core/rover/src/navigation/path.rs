@@ -26,7 +26,7 @@ use crate::driving::path_choice::Veto;
 use crate::hazards::goodness::{CellBasis, GoodnessCell, HazardTerm};
 use sightline_geometry::frames::Pose;
 
-use super::ground::{Ground, Spot};
+use super::ground::{Ground, Part, Spot};
 use super::settings::NavigatorSettings;
 
 /// Sampling interval of a turn, rad.
@@ -174,12 +174,12 @@ impl<'a> Path<'a> {
         settings: &'a NavigatorSettings,
     ) -> Self {
         let mut start_m = [f64::INFINITY; 3];
-        for (clearance_m, ahead) in start_m.iter_mut().zip(&footprint.offsets_m) {
-            *clearance_m = ground.spot(start.place([*ahead, 0.0])).clearance_m;
+        for (number, (clearance_m, ahead)) in start_m.iter_mut().zip(&footprint.offsets_m).enumerate() {
+            *clearance_m = ground.spot(start.place([*ahead, 0.0]), Part::of(number)).clearance_m;
         }
         let samples = footprint.discs.iter().map(|disc| {
             let at_m = start.place(disc.place_m);
-            Sample { disc: *disc, at_m, spot: ground.spot(at_m) }
+            Sample { disc: *disc, at_m, spot: ground.spot(at_m, Part::of(disc.number)) }
         });
         Self {
             settings,

@@ -10,7 +10,7 @@
 //!
 //! Frame: site, m.
 
-use super::ground::Ground;
+use super::ground::{Ground, Part};
 
 /// The cells that bad ground does not separate from the rover.
 #[derive(Clone)]
@@ -22,7 +22,9 @@ pub(super) struct Reachable {
 impl Reachable {
     /// The cells reachable from a position, site frame, m.
     pub(super) fn new(ground: &Ground<'_>, from_m: [f64; 2]) -> Self {
-        let Some(start) = ground.map.grid.index_at(from_m).filter(|index| !ground.is_bad(*index)) else {
+        let Some(start) =
+            ground.map.grid.index_at(from_m).filter(|index| !ground.is_bad(*index, Part::Origin))
+        else {
             return Self { cells: None };
         };
         let side = ground.map.grid.side;
@@ -35,7 +37,7 @@ impl Reachable {
             if is_border(row, column, side) && !is_border_reached {
                 is_border_reached = true;
                 let border = (0..cells.len()).filter(|index| is_border(index / side, index % side, side));
-                for at in border.filter(|index| !ground.is_bad(*index)) {
+                for at in border.filter(|index| !ground.is_bad(*index, Part::Origin)) {
                     if !std::mem::replace(&mut cells[at], true) {
                         open.push(at);
                     }
@@ -44,7 +46,7 @@ impl Reachable {
             for row in row.saturating_sub(1)..=(row + 1).min(side - 1) {
                 for column in column.saturating_sub(1)..=(column + 1).min(side - 1) {
                     let at = row * side + column;
-                    if !cells[at] && !ground.is_bad(at) {
+                    if !cells[at] && !ground.is_bad(at, Part::Origin) {
                         cells[at] = true;
                         open.push(at);
                     }

@@ -19,7 +19,7 @@ use std::collections::BinaryHeap;
 
 use crate::hazards::goodness::CellBasis;
 
-use super::ground::{Ground, Spot};
+use super::ground::{Ground, Part, Spot};
 use super::settings::NavigatorSettings;
 
 /// Smallest quality, which limits the cost of ground that is not bad.
@@ -162,7 +162,7 @@ impl<'a> Route<'a> {
 
 /// Cost of a metre over a cell, in metres of good ground.
 fn cell_cost(ground: &Ground<'_>, index: usize, settings: &NavigatorSettings) -> f64 {
-    let spot = ground.spot_of(index);
+    let spot = ground.spot_of(index, Part::Origin);
     if spot.is_bad() {
         return settings.bad_cost;
     }

@@ -14,7 +14,7 @@ use utoipa::ToSchema;
 
 use crate::hazards::goodness::HazardTerm;
 
-use super::ground::Spot;
+use super::ground::{Part, Spot};
 use super::moves::Moves;
 use super::path::Stance;
 use super::reachable::Reachable;
@@ -122,15 +122,17 @@ impl<'a> Aim<'a> {
 
     /// The bad ground that prevents the rover from standing at a place; `None` if there is none.
     fn bad_spot(&self, at_m: [f64; 2]) -> Option<Spot> {
-        let centre = self.moves.ground.spot(at_m);
+        let centre = self.moves.ground.spot(at_m, Part::Origin);
         if centre.is_bad() {
             return Some(centre);
         }
         let mut last = None;
         for number in 0..HEADINGS {
             let heading_rad = std::f64::consts::TAU * f64::from(number) / f64::from(HEADINGS);
-            let ahead =
-                self.moves.ground.spot(Stance { at_m, heading_rad }.place([self.moves.reach_m(), 0.0]));
+            let ahead = self
+                .moves
+                .ground
+                .spot(Stance { at_m, heading_rad }.place([self.moves.reach_m(), 0.0]), Part::End);
             if !ahead.is_bad() {
                 return None;
             }
