@@ -66,6 +66,12 @@ fn bad_commands_and_bad_input_have_their_own_exit_codes() {
         3,
         "exists",
     );
+    refused(
+        &["drive", "obstacles-10", "--target", "1,2", "--tolerance", "-1"],
+        3,
+        "tolerance_m: -1 is outside",
+    );
+    refused(&["study", "drive-grid", "--rows", "/nowhere/at/all"], 3, "cannot write /nowhere/at/all");
     refused(&["info", folder, "--colour"], 2, "--colour");
     refused(&["simulate", "--out", folder, "--set", "sun.height=3"], 3, "sun.height");
     refused(&["import", folder, "--out", "x"], 3, "native traverse");

@@ -25,7 +25,7 @@ mod sheet;
 use std::io::IsTerminal;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use sightline_geometry::error::{Error, Result};
 
 use crate::version::VERSION;
@@ -67,7 +67,8 @@ enum Command {
 
 /// Runs the command that the arguments name.
 pub fn run() -> ExitCode {
-    let cli = Cli::parse();
+    let matches = with_negative_numbers(Cli::command()).get_matches();
+    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     start_log();
     let outcome = match cli.command {
         Command::Serve(command) => command.run(),
@@ -82,6 +83,16 @@ pub fn run() -> ExitCode {
         Command::Export(command) => command.run(),
     };
     exit_code(outcome)
+}
+
+/// Makes a negative number the value of the option before it, so that the limits of the option are reported for it.
+fn with_negative_numbers(command: clap::Command) -> clap::Command {
+    command
+        .mut_args(|arg| {
+            let takes_number = arg.get_action().takes_values() && !arg.is_allow_hyphen_values_set();
+            arg.allow_negative_numbers(takes_number)
+        })
+        .mut_subcommands(with_negative_numbers)
 }
 
 /// The exit code of a command; writes the error to the standard error.

@@ -1,6 +1,6 @@
 //! `sightline study drive-grid`: commanded drives over slope, rock coverage, use of visual odometry and navigator.
 
-use std::fs::OpenOptions;
+use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -9,6 +9,7 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 use sightline_geometry::cancel::Cancel;
 use sightline_geometry::error::{Error, Result};
+use sightline_rover::visual_odometry::OdometryMode;
 use sightline_study::drive_grid::{Cell, CellSummary, DriveGrid, DriveRow};
 
 use super::drive_options::{NavigatorName, Odometry};
@@ -76,15 +77,21 @@ impl DriveGridStudy {
         for cell in &grid.cells {
             grid.scenario(cell, self.first_seed)?;
         }
-        let known = self.rows.as_deref().map_or_else(|| Ok(Vec::new()), read)?;
+        let known = match self.rows.as_deref() {
+            Some(path) => {
+                // A path that cannot be written is reported now, not after the first drive.
+                open(path)?;
+                read(path)?
+            }
+            None => Vec::new(),
+        };
         let folder = std::env::temp_dir().join(format!("sightline-drive-grid-{}", std::process::id()));
-        let all = grid.cells.len() * grid.seeds.len();
         let shared = Mutex::new((0, Progress::new("drive")));
         let tell = |row: &DriveRow| {
             let mut shared = shared.lock().unwrap_or_else(PoisonError::into_inner);
             shared.0 += 1;
             let done = shared.0;
-            shared.1.tell(done, all);
+            shared.1.tell(done, left(&grid, &known, &row.code));
             self.rows.as_deref().map_or(Ok(()), |path| add(path, row))
         };
         let rows = grid.run(&known, &folder, Cancel::default(), &tell);
@@ -122,13 +129,21 @@ impl DriveGridStudy {
     }
 }
 
-/// The rows of a file; none if the file does not exist yet.
-fn read(path: &Path) -> Result<Vec<DriveRow>> {
-    let text = match std::fs::read_to_string(path) {
-        Ok(text) => text,
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
-        Err(source) => return Err(Error::Read { path: path.to_owned(), source }),
+/// Number of drives of the grid that are not among the rows of the same code.
+fn left(grid: &DriveGrid, known: &[DriveRow], code: &str) -> usize {
+    let is_known = |row: &&DriveRow| {
+        row.code == code
+            && grid.cells.contains(&row.cell)
+            && grid.seeds.contains(&row.seed)
+            && (row.size, row.samples_per_axis) == (grid.size, grid.samples_per_axis)
     };
+    (grid.cells.len() * grid.seeds.len()).saturating_sub(known.iter().filter(is_known).count())
+}
+
+/// The rows of a file.
+fn read(path: &Path) -> Result<Vec<DriveRow>> {
+    let text =
+        std::fs::read_to_string(path).map_err(|source| Error::Read { path: path.to_owned(), source })?;
     let row = |(number, line): (usize, &str)| {
         let problem = |error: serde_json::Error| {
             Error::format(
@@ -141,17 +156,26 @@ fn read(path: &Path) -> Result<Vec<DriveRow>> {
     text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()).map(row).collect()
 }
 
-fn add(path: &Path, row: &DriveRow) -> Result<()> {
+/// Opens the file of rows for appending, and creates it if it does not exist.
+fn open(path: &Path) -> Result<File> {
     let failed = |source| Error::Write { path: path.to_owned(), source };
+    OpenOptions::new().create(true).append(true).open(path).map_err(failed)
+}
+
+fn add(path: &Path, row: &DriveRow) -> Result<()> {
     let mut text = serde_json::to_string(row).map_err(|error| Error::Request(error.to_string()))?;
     text.push('\n');
-    let mut file = OpenOptions::new().create(true).append(true).open(path).map_err(failed)?;
-    file.write_all(text.as_bytes()).map_err(failed)
+    open(path)?.write_all(text.as_bytes()).map_err(|source| Error::Write { path: path.to_owned(), source })
 }
 
 /// One line of the table.
 fn sentence(summary: &CellSummary) -> String {
     let Cell { slope_deg, coverage, odometry, navigator } = summary.cell;
+    let odometry = match odometry {
+        OdometryMode::Off => "off",
+        OdometryMode::SlipCheck => "slip-check",
+        OdometryMode::Full => "full",
+    };
     let [low, high] = summary.arrived_interval.map(|share| 100.0 * share);
     let cm = |errors: Option<[f64; 2]>| {
         let words =
@@ -162,7 +186,7 @@ fn sentence(summary: &CellSummary) -> String {
         summary.reasons.iter().map(|(reason, count)| format!("{reason} {count}")).collect();
     let others = if reasons.is_empty() { String::new() } else { format!("; {}", reasons.join(", ")) };
     format!(
-        "slope {slope_deg}°, coverage {:.0} %, odometry {odometry:?}, {}: {} of {} arrived ({low:.0} to {high:.0} %), with a way {} of {}{others}; {} collisions; target error {}, goal error {}",
+        "slope {slope_deg}°, coverage {:.0} %, odometry {odometry}, {}: {} of {} arrived ({low:.0} to {high:.0} %), with a way {} of {}{others}; {} collisions; target error {}, goal error {}",
         100.0 * coverage,
         navigator.name(),
         summary.arrived,
